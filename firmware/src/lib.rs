@@ -1,0 +1,3 @@
+//! Ossature on a microcontroller.
+#![no_std]
+pub use shared;

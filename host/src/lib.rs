@@ -1,0 +1,11 @@
+//! Ossature on a PC, in the order in which data flows: a source gives a stereo pair, the calibration
+//! says what its pixels mean, the core of `shared` describes and matches it, the stages here grow the
+//! solid, and exports and reports write it down.
+
+pub mod calibration;
+pub mod evaluate;
+pub mod export;
+pub mod mesh;
+pub mod render;
+pub mod shape;
+pub mod stage;

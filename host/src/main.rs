@@ -1,0 +1,2 @@
+//! `host`: parse, run, exit code.
+fn main() {}

@@ -1,0 +1,1 @@
+//! Independent oracles: naive twins, shapes with known truth, a mesh checker.
