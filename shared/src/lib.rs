@@ -1,2 +1,10 @@
+//! Ossature's core, in the order in which data flows.
 #![no_std]
-//! core
+#![forbid(unsafe_code)]
+
+pub mod bitmap;
+pub mod fixed;
+pub mod limits;
+pub mod point;
+
+pub mod stage;

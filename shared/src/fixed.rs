@@ -1,0 +1,90 @@
+//! The fixed-point formats of the core, each with its range.
+//!
+//! | what | format | range | unit |
+//! |---|---|---|---|
+//! | coordinates, lengths, radii, disparity | [`PX`] = 256 in `i32` | +-2^20 (4096 px) | 1/256 px |
+//! | distance to the background | `u16` | 0..=65535 (4095 px) | 1/16 px |
+//! | directions and cosines | [`UNIT`] = 2^14 in `i32` | +-2^14 | 1 |
+//! | ratios, logarithms, slopes | [`ONE`] = 2^16 in `i32` | +-2^15 | 1 |
+
+/// One pixel, in the unit of every coordinate and length: 1/256 px.
+pub const PX: i32 = 256;
+/// Bits below the point of a coordinate.
+pub const PX_BITS: u32 = 8;
+/// One, in the unit of directions and cosines.
+pub const UNIT: i32 = 1 << 14;
+/// One, in the unit of ratios, logarithms and slopes.
+pub const ONE: i32 = 1 << 16;
+
+/// `n / d` rounded to the nearest integer, halves away from zero; 0 when `d` is 0.
+pub const fn div_round(n: i64, d: i64) -> i64 {
+    if d == 0 {
+        return 0;
+    }
+    // Quotients of i64::MIN would overflow; no stage comes near it.
+    let half = d.unsigned_abs() / 2;
+    let q = n.unsigned_abs().saturating_add(half) / d.unsigned_abs();
+    let q = if q > i64::MAX as u64 { i64::MAX } else { q as i64 };
+    if (n < 0) != (d < 0) { -q } else { q }
+}
+
+/// `v` saturated to `i32`.
+pub const fn saturate(v: i64) -> i32 {
+    if v > i32::MAX as i64 {
+        i32::MAX
+    } else if v < i32::MIN as i64 {
+        i32::MIN
+    } else {
+        v as i32
+    }
+}
+
+/// Length of the vector `(a, b)`, in its own unit, rounded down. |a|, |b| < 2^31.
+pub const fn hypot(a: i32, b: i32) -> i32 {
+    let (a, b) = (a as i64, b as i64);
+    saturate(((a * a + b * b) as u64).isqrt() as i64)
+}
+
+/// Base-two logarithm of `x`, in 1/65536; 0 for `x` = 0. Error below 3/65536.
+///
+/// The whole part is the position of the leading one; the fraction comes bit by bit from repeated
+/// squaring of the mantissa (Q2.30), each squaring that passes 2 giving a one.
+pub const fn log2(x: u64) -> i32 {
+    if x == 0 {
+        return 0;
+    }
+    let whole = x.ilog2();
+    let mut m = if whole >= 30 { x >> (whole - 30) } else { x << (30 - whole) };
+    let mut log = (whole as i32) << 16;
+    let mut bit = 1 << 15;
+    while bit > 0 {
+        m = (m * m) >> 30;
+        if m >= 2 << 30 {
+            m >>= 1;
+            log += bit;
+        }
+        bit >>= 1;
+    }
+    log
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounding_division_is_symmetric() {
+        assert_eq!([div_round(7, 2), div_round(-7, 2), div_round(7, -2), div_round(6, 4)], [4, -4, -4, 2]);
+        assert_eq!(div_round(5, 0), 0);
+        assert_eq!(div_round(i64::MIN, 1), -i64::MAX);
+    }
+
+    #[test]
+    fn logarithm_of_powers_is_exact_and_monotone() {
+        for k in 0..64 {
+            assert_eq!(log2(1 << k), k << 16);
+        }
+        assert!((1..5000u64).all(|x| log2(x) <= log2(x + 1)));
+        assert!((log2(3) - 103_872).abs() <= 3, "log2 3 = 1.5849625");
+    }
+}
