@@ -1,6 +1,6 @@
 //! Points of the image plane and the one exact predicate on them.
 
-use crate::fixed::PX;
+use crate::fixed::{PX, UNIT, div_round, hypot};
 
 /// A pixel by column and row.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -43,8 +43,8 @@ impl PixelPoint {
     /// The point a fraction `num / den` of the way to `other`.
     pub const fn lerp(self, other: Self, num: i32, den: i32) -> Self {
         Self {
-            u: self.u + crate::fixed::div_round((other.u - self.u) as i64 * num as i64, den as i64) as i32,
-            v: self.v + crate::fixed::div_round((other.v - self.v) as i64 * num as i64, den as i64) as i32,
+            u: self.u + div_round((other.u - self.u) as i64 * num as i64, den as i64) as i32,
+            v: self.v + div_round((other.v - self.v) as i64 * num as i64, den as i64) as i32,
         }
     }
 
@@ -59,4 +59,55 @@ impl PixelPoint {
 /// the right as seen on the screen (v down), zero when the three are collinear. Exact; below 2^44.
 pub const fn orient(a: PixelPoint, b: PixelPoint, c: PixelPoint) -> i64 {
     (b.u - a.u) as i64 * (c.v - a.v) as i64 - (b.v - a.v) as i64 * (c.u - a.u) as i64
+}
+
+/// A unit vector of the image plane, in 1/16384.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Direction {
+    /// Horizontal part, +-[`UNIT`].
+    pub u: i16,
+    /// Vertical part, +-[`UNIT`].
+    pub v: i16,
+}
+
+impl Direction {
+    /// The direction of the vector `(u, v)`, |u|, |v| < 2^30; `None` for the zero vector.
+    pub fn of(u: i32, v: i32) -> Option<Self> {
+        let length = i64::from(hypot(u, v));
+        if length == 0 {
+            return None;
+        }
+        let part = |x: i32| {
+            div_round(i64::from(x) * i64::from(UNIT), length).clamp(-UNIT as i64, UNIT as i64) as i16
+        };
+        Some(Self { u: part(u), v: part(v) })
+    }
+
+    /// Cosine of the angle to another direction, in 1/16384.
+    pub const fn dot(self, other: Self) -> i32 {
+        (self.u as i32 * other.u as i32 + self.v as i32 * other.v as i32) >> 14
+    }
+
+    /// Sine of the turn to another direction (positive towards +v from +u), in 1/16384.
+    pub const fn cross(self, other: Self) -> i32 {
+        (self.u as i32 * other.v as i32 - self.v as i32 * other.u as i32) >> 14
+    }
+
+    /// Turned by the angle whose sine is `sine` / 16384, |angle| <= 90 degrees.
+    pub fn turned(self, sine: i32) -> Self {
+        let sine = sine.clamp(-UNIT, UNIT);
+        let cosine = ((UNIT * UNIT - sine * sine) as u32).isqrt() as i32;
+        let (u, v) = (i32::from(self.u), i32::from(self.v));
+        Self::of((u * cosine - v * sine) >> 14, (u * sine + v * cosine) >> 14).unwrap_or(self)
+    }
+
+    /// Component along this direction of the vector from `a` to `b`, 1/256 px.
+    pub const fn along(self, a: PixelPoint, b: PixelPoint) -> i32 {
+        ((self.u as i64 * (b.u - a.u) as i64 + self.v as i64 * (b.v - a.v) as i64) >> 14) as i32
+    }
+
+    /// The opposite direction.
+    pub const fn reversed(self) -> Self {
+        Self { u: -self.u, v: -self.v }
+    }
 }

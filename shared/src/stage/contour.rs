@@ -1,0 +1,298 @@
+//! Contour: the silhouette's edge as ordered loops of sub-pixel points with normals.
+//!
+//! Paper section 3.2 keeps the boundary's pixels; METHOD step 5 needs it to a fraction of a pixel,
+//! since one pixel of disparity is millimetres of depth.
+//!
+//! * **In**: the grey image and the cleaned mask, both of one size.
+//! * **Out**: points every pixel of arc, in loops that keep the object on their right as seen on the
+//!   screen (the outer loop runs clockwise, holes the other way), each with its outward normal.
+//! * **How**: the loop follows the cracks between set and clear pixels of the mask, so it is closed and
+//!   has the mask's topology whatever the grey values are; foreground is 8-connected. Each crack is then
+//!   moved along its axis to where the edge really is: a pixel that the edge passes through has a grey
+//!   value between the object's and the background's in proportion to the covered area, so the covered
+//!   lengths of the few pixels on either side add up to the position. The two grey levels are taken two
+//!   pixels inside and outside, so shading does not move the edge. (On a disc of radius 20 px the points
+//!   are then 0.014..0.019 px off, rms; linear interpolation at the middle level gives 0.05.)
+//! * **Cost**: linear in the number of cracks.
+//! * **Not promised**: that the polygon is free of self-intersections where parts are thinner than 2 px.
+
+use crate::bitmap::{Bitmap, Grey};
+use crate::fixed::{PX, hypot};
+use crate::limits::{CapacityError, push};
+use crate::point::{Direction, PixelPoint};
+use heapless::VecView;
+
+/// A sample of the contour.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ContourPoint {
+    /// Where the edge is.
+    pub at: PixelPoint,
+    /// Unit normal, away from the object.
+    pub normal: Direction,
+    /// The object is cut off by the image's border here: there is no edge.
+    pub border: bool,
+}
+
+/// A closed run of contour points.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ContourLoop {
+    /// Index of the first point.
+    pub start: usize,
+    /// Number of points, at least 8.
+    pub len: usize,
+}
+
+impl ContourLoop {
+    /// Indices of the points, in order.
+    pub const fn range(self) -> core::ops::Range<usize> {
+        self.start..self.start + self.len
+    }
+
+    /// The index `offset` points further along the loop; |offset| <= len.
+    pub const fn step(self, index: usize, offset: isize) -> usize {
+        let from = (index - self.start) as isize + self.len as isize + offset;
+        self.start + from as usize % self.len
+    }
+}
+
+/// The crack between a set pixel and its clear neighbour, moved on to the edge.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct EdgeCrossing {
+    at: PixelPoint,
+    border: bool,
+}
+
+/// The four axes, clockwise on the screen, from the inner to the outer pixel of a crack.
+const AXES: [(i32, i32); 4] = [(0, -1), (1, 0), (0, 1), (-1, 0)];
+
+/// Pixels on either side of a crack whose grey values are looked at.
+const REACH: usize = 2;
+
+/// Grey levels by which object and background must differ for an edge to be placed by them.
+const MIN_CONTRAST: i32 = 8;
+
+/// k g(k) of a Gaussian of 1.5 px, in 1/64: the derivative that gives tangents.
+const TANGENT: [i32; 5] = [51, 53, 26, 7, 1];
+
+/// Trace all loops of `mask` and sample them at about 1 px of arc.
+///
+/// `seen` is a scratch bitmap of the mask's size, `crossings` scratch for the longest loop.
+///
+/// # Errors
+/// A [`CapacityError`] when a list is too short; `points` and `loops` are then incomplete.
+pub fn contour(
+    grey: Grey<'_>,
+    mask: &Bitmap<'_>,
+    seen: &mut Bitmap<'_>,
+    crossings: &mut VecView<EdgeCrossing>,
+    points: &mut VecView<ContourPoint>,
+    loops: &mut VecView<ContourLoop>,
+) -> Result<(), CapacityError> {
+    points.clear();
+    loops.clear();
+    seen.clear();
+    for v in 0..mask.size().height as i32 {
+        for i in 0..mask.size().row_words() {
+            // Every loop has a crack with the clear pixel to the north: start at the first not yet seen.
+            let north_edges = mask.row(v)[i] & !crate::bitmap::at(mask.row(v - 1), i);
+            for bit in crate::bitmap::SetBits(north_edges) {
+                let u = (i * crate::bitmap::WORD_BITS + bit) as i32;
+                if !seen.get(u, v) {
+                    trace(grey, mask, (u, v), seen, crossings)?;
+                    resample(crossings, points, loops)?;
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Follow the cracks from the north side of pixel `start` until back there.
+fn trace(
+    grey: Grey<'_>,
+    mask: &Bitmap<'_>,
+    start: (i32, i32),
+    seen: &mut Bitmap<'_>,
+    crossings: &mut VecView<EdgeCrossing>,
+) -> Result<(), CapacityError> {
+    crossings.clear();
+    let (mut pixel, mut axis) = (start, 0);
+    loop {
+        if axis == 0 {
+            seen.put(pixel.0 as usize, pixel.1 as usize, true);
+        }
+        push(crossings, place(grey, mask, pixel, AXES[axis]), "contour crossings")?;
+        let (outward, ahead) = (AXES[axis], AXES[(axis + 1) % 4]);
+        let beside = (pixel.0 + ahead.0, pixel.1 + ahead.1);
+        let diagonal = (beside.0 + outward.0, beside.1 + outward.1);
+        if mask.get(diagonal.0, diagonal.1) {
+            (pixel, axis) = (diagonal, (axis + 3) % 4);
+        } else if mask.get(beside.0, beside.1) {
+            pixel = beside;
+        } else {
+            axis = (axis + 1) % 4;
+        }
+        if (pixel, axis) == (start, 0) {
+            return Ok(());
+        }
+    }
+}
+
+/// Where along `axis` the edge lies near the outer side of `pixel`.
+fn place(grey: Grey<'_>, mask: &Bitmap<'_>, pixel: (i32, i32), axis: (i32, i32)) -> EdgeCrossing {
+    let at = |k: i32| (pixel.0 + k * axis.0, pixel.1 + k * axis.1);
+    let run = |first: i32, step: i32, inside: bool| {
+        (0..REACH as i32)
+            .take_while(|k| {
+                let (u, v) = at(first + k * step);
+                mask.size().contains(u, v) && mask.get(u, v) == inside
+            })
+            .count() as i32
+    };
+    let (inner, outer) = (run(0, -1, true), run(1, 1, false));
+    let mut shift = 0;
+    if outer > 0 {
+        let level = |k: i32| {
+            let (u, v) = at(k);
+            i32::from(grey.get(u, v))
+        };
+        let (object, background) = (level(1 - inner), level(outer));
+        let contrast = object - background;
+        if contrast.abs() >= MIN_CONTRAST {
+            let covered = |k: i32| ((level(k) - background) * PX / contrast).clamp(0, PX);
+            shift =
+                (1..outer).map(covered).sum::<i32>() - (2 - inner..=0).map(|k| PX - covered(k)).sum::<i32>();
+        }
+    }
+    let along = PX / 2 + shift.clamp(-PX * 3 / 4, PX * 3 / 4);
+    EdgeCrossing {
+        at: PixelPoint { u: pixel.0 * PX + along * axis.0, v: pixel.1 * PX + along * axis.1 },
+        border: outer == 0,
+    }
+}
+
+/// Append the loop with points at equal arc lengths of about 1 px and their normals.
+fn resample(
+    crossings: &[EdgeCrossing],
+    points: &mut VecView<ContourPoint>,
+    loops: &mut VecView<ContourLoop>,
+) -> Result<(), CapacityError> {
+    let next = |i: usize| crossings[if i + 1 == crossings.len() { 0 } else { i + 1 }].at;
+    let segment = |i: usize| {
+        let (a, b) = (crossings[i].at, next(i));
+        hypot(b.u - a.u, b.v - a.v)
+    };
+    let length: i64 = (0..crossings.len()).map(|i| i64::from(segment(i))).sum();
+    let len = (length / i64::from(PX)).max(8);
+    let here = ContourLoop { start: points.len(), len: len as usize };
+    let (mut i, mut before) = (0, 0i64);
+    for k in 0..len {
+        let target = length * k / len;
+        while i + 1 < crossings.len() && before + i64::from(segment(i)) <= target {
+            before += i64::from(segment(i));
+            i += 1;
+        }
+        let at = crossings[i].at.lerp(next(i), (target - before) as i32, segment(i));
+        let point = ContourPoint { at, normal: Direction::default(), border: crossings[i].border };
+        push(points, point, "contour points")?;
+    }
+    for i in here.range() {
+        let tangent = TANGENT.iter().zip(1..).fold((0, 0), |(u, v), (weight, k)| {
+            let (a, b) = (points[here.step(i, -k)].at, points[here.step(i, k)].at);
+            (u + weight * (b.u - a.u), v + weight * (b.v - a.v))
+        });
+        points[i].normal = Direction::of(tangent.1, -tangent.0).unwrap_or_default();
+    }
+    push(loops, here, "contour loops")
+}
+
+/// The pixel in which the contour's highest point lies, and its lowest: `(top, bottom)`, 1/256 px.
+/// These are the frontier points, where the epipolar plane touches the object: in a rectified pair
+/// both eyes see them in the same row.
+pub fn frontier(points: &[ContourPoint]) -> Option<(ContourPoint, ContourPoint)> {
+    let top = points.iter().min_by_key(|p| p.at.v)?;
+    let bottom = points.iter().max_by_key(|p| p.at.v)?;
+    Some((*top, *bottom))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bitmap::{Size, Word};
+    use heapless::Vec;
+
+    /// A disc with area-sampled edge, bright on dark, radius and centre in 1/16 px.
+    fn disc(size: Size, centre: (i32, i32), radius: i32, grey: &mut [u8]) {
+        for v in 0..size.height as i32 {
+            for u in 0..size.width as i32 {
+                let inside = (0..256)
+                    .filter(|s| {
+                        let (du, dv) = (u * 16 + s % 16 - 8 - centre.0, v * 16 + s / 16 - 8 - centre.1);
+                        (2 * du + 1).pow(2) + (2 * dv + 1).pow(2) <= (2 * radius).pow(2)
+                    })
+                    .count() as i32;
+                grey[v as usize * size.width + u as usize] = (12 + inside * 180 / 256) as u8;
+            }
+        }
+    }
+
+    #[test]
+    fn a_disc_is_found_to_a_fraction_of_a_pixel() {
+        let size = Size::new(64, 64).unwrap();
+        let (mut grey, mut words, mut scratch) = ([0; 64 * 64], [0 as Word; 128], [0 as Word; 128]);
+        for (centre, radius, bound) in
+            [((512, 512), 320, 0.02), ((519, 505), 331, 0.02), ((505, 515), 100, 0.045)]
+        {
+            disc(size, centre, radius, &mut grey);
+            let mut mask = Bitmap::new(size, &mut words).unwrap();
+            (0..64 * 64).for_each(|i| mask.put(i % 64, i / 64, grey[i] > 100));
+            let mut seen = Bitmap::new(size, &mut scratch).unwrap();
+            let (mut raw, mut points, mut loops) =
+                (Vec::<_, 1024>::new(), Vec::<_, 1024>::new(), Vec::<_, 4>::new());
+            let image = Grey::new(size, 64, &grey).unwrap();
+            contour(image, &mask, &mut seen, &mut raw, &mut points, &mut loops).unwrap();
+            assert_eq!(loops.len(), 1);
+            let mut square_sum = 0.0;
+            for p in &points {
+                let (du, dv) = (
+                    f64::from(p.at.u) / 256.0 - f64::from(centre.0) / 16.0,
+                    f64::from(p.at.v) / 256.0 - f64::from(centre.1) / 16.0,
+                );
+                let error = du.hypot(dv) - f64::from(radius) / 16.0;
+                square_sum += error * error;
+                assert!(error.abs() < 0.15, "{error} px off the disc of {radius}/16");
+                let cosine =
+                    (du * f64::from(p.normal.u) + dv * f64::from(p.normal.v)) / du.hypot(dv) / 16384.0;
+                assert!(cosine > 0.995, "normal off by {} degrees", cosine.acos().to_degrees());
+            }
+            let rms = (square_sum / points.len() as f64).sqrt();
+            assert!(rms < bound, "rms {rms} px on the disc of {radius}/16");
+        }
+    }
+
+    #[test]
+    fn loops_keep_the_masks_topology() {
+        let mut words = [0; 16];
+        let mask = Bitmap::from_art(
+            "#######\n\
+             #.....#\n\
+             #..#..#\n\
+             #.....#\n\
+             #######\n\
+             .......\n\
+             ##.....",
+            &mut words,
+        )
+        .unwrap();
+        let grey: [u8; 49] =
+            core::array::from_fn(|i| if mask.get(i as i32 % 7, i as i32 / 7) { 200 } else { 10 });
+        let mut scratch = [0; 16];
+        let mut seen = Bitmap::new(mask.size(), &mut scratch).unwrap();
+        let (mut raw, mut points, mut loops) =
+            (Vec::<_, 256>::new(), Vec::<_, 256>::new(), Vec::<_, 8>::new());
+        let image = Grey::new(mask.size(), 7, &grey).unwrap();
+        contour(image, &mask, &mut seen, &mut raw, &mut points, &mut loops).unwrap();
+        assert_eq!(loops.len(), 4, "ring outside, ring inside, dot, bar");
+        assert!(points.iter().any(|p| p.border) && points.iter().any(|p| !p.border));
+    }
+}

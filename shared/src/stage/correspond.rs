@@ -1,0 +1,205 @@
+//! Correspondence of the two hulls through their affine invariants (paper section 4.1.3).
+//!
+//! * **In**: the ordered vertices of both convex hulls.
+//! * **Out**: which vertex of the left hull is which of the right one, how sure that is, and the affine
+//!   map that follows.
+//!
+//! Two ways, chosen by the caller:
+//!
+//! * [`match_cuts`], the default: digitised hull vertices are no repeatable features, so both hulls are
+//!   first cut at the same six relative heights, which takes the paper's "all the vertices in both images
+//!   are distributed equally" at its word: twelve vertices, in the same order in both views. e_omega
+//!   (omega = 3, logarithms of the ratios), averaged around the hull, is then computed for each cyclic
+//!   shift. The rows of a rectified pair say that shift 0 is right; a least e_omega elsewhere is a tie of a
+//!   symmetric hull if e_omega at 0 is nearly as small, and a sign of two different shapes if not.
+//! * [`match_vertices`], the paper: the hulls' own vertices, their number made equal by deleting those that
+//!   matter least, arg-min of e_omega over all pairs of quadruplets, then all triples of vertices whose
+//!   area agrees.
+//!
+//! * **Cost**: 12^2 feature vectors; for the paper's, n^2 omega of them and n^3 triples.
+
+use crate::fixed::{ONE, div_round};
+use crate::limits::HULL_CUTS;
+use crate::point::{PixelPoint, orient};
+use crate::stage::invariants::{Measure, e_omega};
+use crate::stage::plane::AffineMap;
+use heapless::VecView;
+
+/// Vertices of a cut hull.
+pub const CUT_VERTICES: usize = 2 * HULL_CUTS;
+
+/// Quadruplets of consecutive vertices compared in the default mode.
+const OMEGA: usize = 3;
+
+/// (1 - cos(pi (k + 1/2) / 6)) / 2 in 1/65536: dense where the hull closes.
+const CUT_HEIGHTS: [i32; HULL_CUTS] = [1117, 9598, 24_287, 41_249, 55_938, 64_419];
+
+/// Two hulls, cut and compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CutMatch {
+    /// Vertices of the left hull, down its right and up its left side.
+    pub left: [PixelPoint; CUT_VERTICES],
+    /// Vertices of the right hull, in the same order.
+    pub right: [PixelPoint; CUT_VERTICES],
+    /// e_omega averaged around the hull for each cyclic shift, in 1/65536 of log2^2.
+    pub errors: [u32; CUT_VERTICES],
+    /// The shift of the least error: 0 when the invariants agree with the rows.
+    pub shift: usize,
+}
+
+impl CutMatch {
+    /// The least error of any other shift over that of the chosen one, in 1/65536: the margin by which
+    /// the invariants decide.
+    pub fn margin(&self) -> u32 {
+        let others = self.errors.iter().enumerate().filter(|(s, _)| *s != self.shift).map(|(_, e)| *e);
+        let second = u64::from(others.min().unwrap_or(0));
+        ((second << 16) / u64::from(self.errors[self.shift].max(1))).min(u64::from(u32::MAX)) as u32
+    }
+}
+
+/// Cut both hulls at equal relative heights and compare their invariants at every cyclic shift.
+///
+/// `None` when a hull has no height.
+pub fn match_cuts(left: &[PixelPoint], right: &[PixelPoint]) -> Option<CutMatch> {
+    let (left, right) = (cut(left)?, cut(right)?);
+    let errors = core::array::from_fn(|s| {
+        let sum: u64 = (0..CUT_VERTICES)
+            .map(|i| e_omega((&left, i), (&right, i + s), OMEGA, Measure::Logarithm) >> 16)
+            .sum();
+        (sum / CUT_VERTICES as u64).min(u64::from(u32::MAX)) as u32
+    });
+    let shift = (0..CUT_VERTICES).min_by_key(|&s| errors[s]).unwrap_or(0);
+    Some(CutMatch { left, right, errors, shift })
+}
+
+/// The hull's outline at the six heights: right side downwards, left side upwards.
+fn cut(hull: &[PixelPoint]) -> Option<[PixelPoint; CUT_VERTICES]> {
+    let top = hull.iter().map(|p| p.v).min()?;
+    let bottom = hull.iter().map(|p| p.v).max()?;
+    if bottom <= top {
+        return None;
+    }
+    let mut vertices = [PixelPoint::default(); CUT_VERTICES];
+    for (k, height) in CUT_HEIGHTS.iter().enumerate() {
+        let v = top + div_round(i64::from(bottom - top) * i64::from(*height), i64::from(ONE)) as i32;
+        let (mut low, mut high) = (i32::MAX, i32::MIN);
+        for (i, a) in hull.iter().enumerate() {
+            let b = hull[(i + 1) % hull.len()];
+            if (a.v <= v) != (b.v <= v) {
+                let u = a.lerp(b, v - a.v, b.v - a.v).u;
+                (low, high) = (low.min(u), high.max(u));
+            }
+        }
+        vertices[k] = PixelPoint { u: high, v };
+        vertices[CUT_VERTICES - 1 - k] = PixelPoint { u: low, v };
+    }
+    Some(vertices)
+}
+
+/// The paper's parameters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PaperMatching {
+    /// Consecutive quadruplets compared: 1, 2 or 3 for four, five or six matched vertices.
+    pub omega: usize,
+    /// A triple of vertices corresponds when the ratios of its area to the matched quadruplet's differ
+    /// by less than this part of it, in 1/65536.
+    pub threshold: i32,
+}
+
+impl Default for PaperMatching {
+    fn default() -> Self {
+        Self { omega: 3, threshold: ONE / 20 }
+    }
+}
+
+/// The paper's match of two hulls.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct VertexMatch {
+    /// First vertices of the two quadruplets with the least e_omega.
+    pub quadruplets: (usize, usize),
+    /// That e_omega, in 1/65536.
+    pub error: u64,
+    /// Vertices that take part in the map.
+    pub vertices: usize,
+    /// The affine map from the left to the right view.
+    pub map: AffineMap,
+}
+
+impl VertexMatch {
+    /// The right hull's vertex that corresponds to the left hull's vertex `k`, hulls of `n` vertices.
+    pub const fn partner(&self, k: usize, n: usize) -> usize {
+        (k + n - self.quadruplets.0 + self.quadruplets.1) % n
+    }
+}
+
+/// Delete vertices until `n` are left, always the one whose triangle with its neighbours is smallest.
+pub fn reduce(hull: &mut VecView<PixelPoint>, n: usize) {
+    while hull.len() > n.max(3) {
+        let m = hull.len();
+        let area = |i: usize| orient(hull[(i + m - 1) % m], hull[i], hull[(i + 1) % m]).unsigned_abs();
+        let least = (0..m).min_by_key(|&i| area(i)).unwrap_or(0);
+        hull.remove(least);
+    }
+}
+
+/// The paper's matching: equalise the vertices, take the quadruplets of least e_omega, then every vertex
+/// of a triple whose area agrees, and fit the map to these.
+///
+/// Both hulls are reduced to the smaller number of vertices, at most `limit`. `None` with fewer than four.
+pub fn match_vertices(
+    left: &mut VecView<PixelPoint>,
+    right: &mut VecView<PixelPoint>,
+    limit: usize,
+    paper: PaperMatching,
+) -> Option<VertexMatch> {
+    let n = left.len().min(right.len()).min(limit);
+    if n < 4 {
+        return None;
+    }
+    reduce(left, n);
+    reduce(right, n);
+    let candidates = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
+    let error = |(i, j)| e_omega((left, i), (right, j), paper.omega, Measure::Ratio);
+    let (i, j) = candidates.min_by_key(|&pair| error(pair))?;
+    let at = |k: usize| (left[(i + k) % n], right[(j + k) % n]);
+    let seed = (paper.omega + 3).min(n);
+    let reference = widest_triangle(seed, &at)?;
+    let agrees = |k: usize| {
+        k < seed
+            || (0..n).any(|l| {
+                (l + 1..n)
+                    .any(|m| l != k && m != k && triple_agrees([k, l, m], reference, &at, paper.threshold))
+            })
+    };
+    let pairs = (0..n).filter(|&k| agrees(k)).map(at);
+    let map = AffineMap::fit(pairs.clone())?;
+    Some(VertexMatch { quadruplets: (i, j), error: error((i, j)) >> 16, vertices: pairs.count(), map })
+}
+
+/// The doubled areas, left and right, of the largest triangle among the first `n` matched vertices.
+fn widest_triangle(n: usize, at: &impl Fn(usize) -> (PixelPoint, PixelPoint)) -> Option<(i64, i64)> {
+    let triples = (0..n).flat_map(move |a| (a + 1..n).flat_map(move |b| (b + 1..n).map(move |c| [a, b, c])));
+    triples
+        .map(|t| doubled_areas(t, at))
+        .max_by_key(|(left, right)| (*left).min(*right))
+        .filter(|(l, r)| *l > 0 && *r > 0)
+}
+
+/// Twice the area of a triple of matched vertices in both views.
+fn doubled_areas(triple: [usize; 3], at: &impl Fn(usize) -> (PixelPoint, PixelPoint)) -> (i64, i64) {
+    let [a, b, c] = triple.map(at);
+    (orient(a.0, b.0, c.0).abs(), orient(a.1, b.1, c.1).abs())
+}
+
+/// Whether a triple's area, measured in reference triangles, is the same in both views.
+fn triple_agrees(
+    triple: [usize; 3],
+    reference: (i64, i64),
+    at: &impl Fn(usize) -> (PixelPoint, PixelPoint),
+    threshold: i32,
+) -> bool {
+    let (left, right) = doubled_areas(triple, at);
+    // left / reference.0 against right / reference.1, cross-multiplied: below 2^104.
+    let (a, b) = (i128::from(left) * i128::from(reference.1), i128::from(right) * i128::from(reference.0));
+    a > 0 && b > 0 && (a - b).abs() << 16 < a.max(b) * i128::from(threshold)
+}

@@ -1,0 +1,83 @@
+//! Depth of each ball from its contour contacts (METHOD step 9): no skeleton of the right view needed.
+//!
+//! A ball of radius rho touches the left contour where its normal is nL and the right one where it is nR.
+//! Both contours of a sphere are circles about its centre, so the centre's disparity is that of a contact
+//! plus what the turn from nL to nR moves the contact along the row, weighted by how far the contour
+//! stands across it:
+//!
+//! ```text
+//! d_m = sum nR_x (nR_x d_k + rho (1 - nL . nR)) / sum nR_x^2
+//! ```
+//!
+//! with a twentieth of the plain average, which decides where both contacts run along the rows. A ball's
+//! silhouette is seen r^2 / Z in front of its centre: d_c = d_m f^2 / (f^2 + rho^2).
+//!
+//! * **In**: balls, the matches of the left contour, the focal length.
+//! * **Out**: a disparity a ball, 1/256 px, and how well it is known.
+//! * **Bounds**: every product below 2^60.
+
+use crate::fixed::{UNIT, div_round};
+use crate::limits::{CapacityError, push};
+use crate::stage::contour::ContourPoint;
+use crate::stage::medial::MedialBall;
+use crate::stage::rows::ContourMatch;
+use heapless::VecView;
+
+/// The disparity of a ball's centre.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct BallDepth {
+    /// d_c = u_left - u_right of the centre, 1/256 px.
+    pub disparity: i32,
+    /// Mean n_x^2 of the contacts, 0..=16384.
+    pub weight: i32,
+}
+
+/// Weight of the plain average of the contacts against n_x^2, 1/16384.
+const PLAIN: i64 = UNIT as i64 / 20;
+
+/// The disparity of each ball's centre; `focal` is the focal length in 1/256 px.
+///
+/// # Errors
+/// A [`CapacityError`] when `depths` is too short.
+pub fn ball_depths(
+    balls: &[MedialBall],
+    points: &[ContourPoint],
+    matches: &[ContourMatch],
+    focal: i32,
+    depths: &mut VecView<BallDepth>,
+) -> Result<(), CapacityError> {
+    depths.clear();
+    for ball in balls {
+        let [p, q] = ball.contacts.map(|k| (&points[k as usize], &matches[k as usize]));
+        push(depths, depth(ball.rho, p, q, focal), "ball depths")?;
+    }
+    Ok(())
+}
+
+/// d_c of one ball and its weight.
+fn depth(
+    rho: i32,
+    p: (&ContourPoint, &ContourMatch),
+    q: (&ContourPoint, &ContourMatch),
+    focal: i32,
+) -> BallDepth {
+    let (mut sum, mut total) = (0i64, 0i64);
+    for (point, matched) in [p, q] {
+        if matched.weight > 0 {
+            let across = i64::from(matched.normal_right.u);
+            let turned = i64::from(UNIT - point.normal.dot(matched.normal_right));
+            let slide = (i64::from(rho) * turned) >> 14;
+            sum += (across * (across * i64::from(matched.disparity) + slide * i64::from(UNIT))) >> 14;
+            total += (across * across) >> 14;
+        }
+    }
+    let weight = (total / 2) as i32;
+    let (dp, dq) = (i64::from(p.1.disparity), i64::from(q.1.disparity));
+    let (wp, wq) = (i64::from(p.1.weight) + PLAIN, i64::from(q.1.weight) + PLAIN);
+    let plain = div_round(wp * dp + wq * dq, wp + wq);
+    let matched = div_round(sum + PLAIN * plain, total + PLAIN);
+    let (f2, rho2) = (i64::from(focal).pow(2), i64::from(rho).pow(2));
+    // f^2 / (f^2 + rho^2) in Q2.30: f^2 < 2^46, so the shift stays below i128's range.
+    let factor = ((i128::from(f2) << 30) / i128::from((f2 + rho2).max(1))) as i64;
+    BallDepth { disparity: ((matched * factor + (1 << 29)) >> 30) as i32, weight }
+}

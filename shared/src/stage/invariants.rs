@@ -1,0 +1,110 @@
+//! Convex hull affine invariants (paper section 4.1.2, equations 1 and 2).
+//!
+//! Four consecutive hull vertices span four triangles; an affine map multiplies all areas by the same
+//! factor, so the six ratios of these areas do not change. Only two of them are independent, since
+//! S123 + S134 = S124 + S234, but all six stay, as the paper has them.
+//!
+//! * **In**: ordered vertices of a closed polygon.
+//! * **Out**: ratios in 1/65536, clamped to [2^-8, 2^8] because a nearly flat triangle makes them
+//!   explode; or their base-two logarithms in 1/65536, which weigh S_k / S_l like S_l / S_k.
+//! * **Bounds**: areas below 2^44, differences below 2^24, e_omega below 2^54 for omega <= 3.
+
+use crate::fixed::{ONE, log2};
+use crate::point::{PixelPoint, orient};
+
+/// How ratios of areas are compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Measure {
+    /// By their difference: equation 2 as written.
+    Ratio,
+    /// By the difference of their logarithms.
+    Logarithm,
+}
+
+/// The six ratios I12, I13, I14, I23, I24, I34 of a quadruplet, 1/65536.
+pub type FeatureVector = [i32; 6];
+
+/// The feature vector of quadruplet `i`: vertices i, i + 1, i + 2, i + 3 around the polygon.
+///
+/// All zero for a polygon without vertices.
+pub fn feature_vector(polygon: &[PixelPoint], i: usize, measure: Measure) -> FeatureVector {
+    let n = polygon.len();
+    if n == 0 {
+        return [0; 6];
+    }
+    let [a, b, c, d] = [0, 1, 2, 3].map(|k| polygon[(i + k) % n]);
+    let areas =
+        [orient(a, b, c), orient(a, b, d), orient(a, c, d), orient(b, c, d)].map(|s| s.unsigned_abs().max(1));
+    let logarithms = areas.map(log2);
+    let mut features = [0; 6];
+    let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
+    for (feature, (k, l)) in features.iter_mut().zip(pairs) {
+        *feature = match measure {
+            Measure::Ratio => {
+                let ratio = (u128::from(areas[k]) << 16) / u128::from(areas[l]);
+                ratio.clamp(1 << 8, 1 << 24) as i32
+            }
+            Measure::Logarithm => (logarithms[k] - logarithms[l]).clamp(-8 * ONE, 8 * ONE),
+        };
+    }
+    features
+}
+
+/// e_omega(i, j): the squared distance of `omega` consecutive feature vectors, from quadruplet `i` of the
+/// left and `j` of the right polygon on (equation 2), in 1/2^32.
+pub fn e_omega(
+    (left, i): (&[PixelPoint], usize),
+    (right, j): (&[PixelPoint], usize),
+    omega: usize,
+    measure: Measure,
+) -> u64 {
+    (0..omega)
+        .map(|k| {
+            let (a, b) = (feature_vector(left, i + k, measure), feature_vector(right, j + k, measure));
+            a.iter().zip(b).map(|(a, b)| u64::from(a.abs_diff(b)).pow(2)).sum::<u64>()
+        })
+        .sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HEXAGON: [(i32, i32); 6] =
+        [(0, 0), (900, -300), (2000, 100), (2200, 1500), (800, 2100), (-300, 1200)];
+
+    fn polygon(map: impl Fn(i32, i32) -> (i32, i32)) -> [PixelPoint; 6] {
+        HEXAGON.map(|(u, v)| {
+            let (u, v) = map(u * 64, v * 64);
+            PixelPoint { u, v }
+        })
+    }
+
+    #[test]
+    fn an_affine_map_changes_nothing() {
+        let (left, right) =
+            (polygon(|u, v| (u, v)), polygon(|u, v| (3 * u / 4 + v / 8 + 5000, v - u / 16 - 300)));
+        for measure in [Measure::Ratio, Measure::Logarithm] {
+            for i in 0..6 {
+                let same = e_omega((&left, i), (&right, i), 3, measure);
+                let other = (1..6).map(|s| e_omega((&left, i), (&right, i + s), 3, measure)).min().unwrap();
+                assert!(same < 1 << 20 && same < other / 100, "{measure:?} {i}: {same} against {other}");
+            }
+        }
+    }
+
+    #[test]
+    fn two_ratios_give_the_other_four() {
+        // S123 + S134 = S124 + S234, divided by S234.
+        let f = feature_vector(&polygon(|u, v| (u, v)), 2, Measure::Ratio);
+        let (s1, s2, s3) = (f[2], f[4], f[5]);
+        assert!((s1 + s3 - s2 - ONE).abs() <= 4);
+    }
+
+    #[test]
+    fn flat_quadruplets_are_clamped() {
+        let flat = [0, 1, 2, 3].map(|k| PixelPoint { u: k * 4096, v: 0 });
+        assert!(feature_vector(&flat, 0, Measure::Ratio).iter().all(|r| (1 << 8..=1 << 24).contains(r)));
+        assert_eq!(feature_vector(&[], 3, Measure::Ratio), [0; 6]);
+    }
+}

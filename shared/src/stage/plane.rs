@@ -1,0 +1,154 @@
+//! A plane over the image: one value that changes linearly with u and v, fitted robustly.
+//!
+//! Between two narrow views an object's image changes by an affine map (paper section 4.1.2). In a
+//! rectified pair rows stay rows, so the map is a plane of disparity, d = a u + b v + c; a general map is
+//! two planes, one a coordinate.
+//!
+//! * **How**: least squares with Cauchy weights 1 / (1 + (e / 1 px)^2), re-weighted [`ROUNDS`] times, and
+//!   a ridge of 1 px^2 on both slopes, so that a narrow object does not get a wild slope.
+//! * **Bounds**: coordinates within 2^20 (1/256 px), at most 2^16 observations of weight at most 2^14:
+//!   every sum stays below 2^100 of `i128`.
+//! * **Cost**: linear in the number of observations.
+
+use crate::fixed::{ONE, saturate};
+use crate::point::PixelPoint;
+
+/// value = level + slope_u (u - origin.u) + slope_v (v - origin.v).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ImagePlane {
+    /// Where `level` holds: the centre of gravity of what was fitted.
+    pub origin: PixelPoint,
+    /// Value at the origin, 1/256 px.
+    pub level: i32,
+    /// Change of the value per unit of u, in 1/65536.
+    pub slope_u: i32,
+    /// Change of the value per unit of v, in 1/65536.
+    pub slope_v: i32,
+}
+
+/// A value seen at a point, and how much it counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Observation {
+    /// Where.
+    pub at: PixelPoint,
+    /// What, 1/256 px.
+    pub value: i32,
+    /// Weight, 0..=16384.
+    pub weight: i32,
+}
+
+/// Rounds of re-weighting.
+const ROUNDS: usize = 6;
+/// One pixel squared in units of [`PixelPoint`].
+const PX2: i128 = 1 << 16;
+
+impl ImagePlane {
+    /// The value at a point, 1/256 px.
+    pub const fn at(&self, p: PixelPoint) -> i32 {
+        let rise = self.slope_u as i64 * (p.u - self.origin.u) as i64
+            + self.slope_v as i64 * (p.v - self.origin.v) as i64;
+        saturate(self.level as i64 + ((rise + (ONE as i64 / 2)) >> 16))
+    }
+
+    /// The robust fit, or `None` without an observation of positive weight.
+    pub fn fit(observations: impl Iterator<Item = Observation> + Clone) -> Option<Self> {
+        let mut plane = Self::fit_once(observations.clone().map(|o| (o, i128::from(o.weight))))?;
+        for _ in 0..ROUNDS {
+            let weighted = observations.clone().map(|o| {
+                let error = i128::from(o.value - plane.at(o.at));
+                (o, (i128::from(o.weight) << 16) / (PX2 + error * error))
+            });
+            // Weights may all round to nothing when nothing fits: the last plane is then the answer.
+            match Self::fit_once(weighted) {
+                Some(better) => plane = better,
+                None => break,
+            }
+        }
+        Some(plane)
+    }
+
+    /// Weighted least squares with the ridge.
+    fn fit_once(weighted: impl Iterator<Item = (Observation, i128)> + Clone) -> Option<Self> {
+        let sum = |f: &dyn Fn(&Observation) -> i128| weighted.clone().map(|(o, w)| w * f(&o)).sum::<i128>();
+        let total = sum(&|_| 1);
+        if total <= 0 {
+            return None;
+        }
+        let mean = |f: &dyn Fn(&Observation) -> i128| (sum(f) / total) as i32;
+        let origin = PixelPoint { u: mean(&|o| o.at.u.into()), v: mean(&|o| o.at.v.into()) };
+        let level = mean(&|o| o.value.into());
+        let (u, v, d) = (
+            |o: &Observation| i128::from(o.at.u - origin.u),
+            |o: &Observation| i128::from(o.at.v - origin.v),
+            |o: &Observation| i128::from(o.value - level),
+        );
+        let ridge = total * PX2;
+        let (uu, vv, uv) =
+            (sum(&|o| u(o) * u(o)) + ridge, sum(&|o| v(o) * v(o)) + ridge, sum(&|o| u(o) * v(o)));
+        let (ud, vd) = (sum(&|o| u(o) * d(o)), sum(&|o| v(o) * d(o)));
+        // Sums reach 2^72; 40 bits are plenty for a slope, and keep the products below within i128.
+        let excess = (128 - uu.max(vv).leading_zeros()).saturating_sub(40);
+        let [uu, vv, uv, ud, vd] = [uu, vv, uv, ud, vd].map(|s| s >> excess);
+        let determinant = uu * vv - uv * uv;
+        if determinant <= 0 {
+            return Some(Self { origin, level, ..Self::default() });
+        }
+        let slope = |n: i128| ((n << 16) / determinant).clamp(-(1 << 24), 1 << 24) as i32;
+        Some(Self { origin, level, slope_u: slope(ud * vv - vd * uv), slope_v: slope(vd * uu - ud * uv) })
+    }
+}
+
+/// An affine map of the image plane: u' and v' as planes over u and v.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct AffineMap {
+    /// The new horizontal coordinate.
+    pub u: ImagePlane,
+    /// The new vertical coordinate.
+    pub v: ImagePlane,
+}
+
+impl AffineMap {
+    /// The map that takes the first point of each pair nearest to the second, robustly.
+    pub fn fit(pairs: impl Iterator<Item = (PixelPoint, PixelPoint)> + Clone) -> Option<Self> {
+        let observe = |f: fn(PixelPoint) -> i32| {
+            ImagePlane::fit(pairs.clone().map(move |(a, b)| Observation {
+                at: a,
+                value: f(b),
+                weight: 1 << 14,
+            }))
+        };
+        Some(Self { u: observe(|p| p.u)?, v: observe(|p| p.v)? })
+    }
+
+    /// Where a point goes.
+    pub const fn apply(&self, p: PixelPoint) -> PixelPoint {
+        PixelPoint { u: self.u.at(p), v: self.v.at(p) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixed::PX;
+
+    #[test]
+    fn a_plane_comes_back_in_spite_of_outliers() {
+        let truth = |p: PixelPoint| 80 * PX + (p.u * 3 - p.v * 2) / 100;
+        let points = (0..60i32).map(|k| PixelPoint { u: (k * 37 % 101) * PX, v: (k * 53 % 97) * PX });
+        let seen = points.clone().enumerate().map(|(k, at)| {
+            let value = if k % 7 == 3 { truth(at) + 25 * PX } else { truth(at) };
+            Observation { at, value, weight: 1 << 14 }
+        });
+        let plane = ImagePlane::fit(seen).unwrap();
+        assert!(points.into_iter().all(|p| (plane.at(p) - truth(p)).abs() < PX / 8), "{plane:?}");
+    }
+
+    #[test]
+    fn extremes_do_not_overflow() {
+        let corner = |s: i32| PixelPoint { u: s * (1 << 20), v: -s * (1 << 20) };
+        let seen =
+            [-1, 1, 1, -1].map(|s| Observation { at: corner(s), value: s * (1 << 20), weight: 1 << 14 });
+        assert!(ImagePlane::fit(seen.iter().copied().cycle().take(1 << 16)).is_some());
+        assert_eq!(ImagePlane::fit(core::iter::empty()), None);
+    }
+}

@@ -1,0 +1,364 @@
+//! Row matching: which edge in the right view is which in the left, and so the disparity of every
+//! contour point.
+//!
+//! The paper (section 4.1.3) lets boundary points inside matched hulls correspond; in a rectified pair
+//! they can only do so along a row, and METHOD step 8 uses that.
+//!
+//! * **In**: both contours and the disparity plane that the hulls gave.
+//! * **Out**: for each point of the left contour its disparity, how well it is known, and the right
+//!   view's normal at the same place of the object.
+//! * **How**: in each row a dynamic programme aligns the crossings of both contours in order, pairing
+//!   only edges of the same polarity, at the cost of their distance from the plane (Ohta and Kanade 1985,
+//!   here with silhouette edges). What differs from its neighbours along the contour by more than 1.5 px
+//!   is dropped, the rest is averaged over a few pixels of arc and interpolated in between.
+//! * **Cost**: linear in the contour's length; quadratic in the crossings of one row, at most
+//!   [`ROW_CROSSINGS`].
+//! * **Not promised**: disparity where the contour runs along the rows; `weight` is then near 0.
+
+use crate::fixed::{PX, UNIT, div_round};
+use crate::limits::{CapacityError, ROW_CROSSINGS, push};
+use crate::point::{Direction, PixelPoint};
+use crate::stage::contour::{ContourLoop, ContourPoint};
+use crate::stage::plane::ImagePlane;
+use heapless::VecView;
+
+/// Where a contour crosses the middle of a row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RowCrossing {
+    /// Row.
+    pub v: u16,
+    /// Column, 1/256 px.
+    pub u: i32,
+    /// The contour point before the crossing.
+    pub index: u32,
+    /// How far on to the next point the crossing lies, 1/256.
+    pub fraction: u8,
+    /// The contour runs downwards here: the object lies to the left.
+    pub downwards: bool,
+}
+
+/// What the right view says about a point of the left contour.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ContourMatch {
+    /// u_left - u_right, 1/256 px.
+    pub disparity: i32,
+    /// n_x^2 of the right normal, in 1/16384: how far the edge stands across the row; 0 on the image's
+    /// border and on loops of which nothing was matched.
+    pub weight: u16,
+    /// Normal of the right contour at the corresponding point.
+    pub normal_right: Direction,
+}
+
+/// A match that the rest of its loop is filled from.
+#[derive(Clone, Copy, Debug)]
+pub struct Trusted {
+    /// Contour point.
+    index: u32,
+    /// Disparity beyond the plane, 1/256 px.
+    excess: i32,
+    /// Sine of the turn from the left to the right normal, 1/16384.
+    turn: i32,
+    /// As in [`ContourMatch`].
+    weight: u16,
+}
+
+/// How the matching went.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RowStatistics {
+    /// Crossings of the left contour with rows.
+    pub crossings: u32,
+    /// Those that found no partner.
+    pub unmatched: u32,
+}
+
+/// Cost of leaving a crossing unmatched, 1/256 px.
+const SKIP: i32 = 6 * PX;
+/// Cost of a match at most, 1/256 px: a wrong plane must not forbid a match altogether.
+const COST_CAP: i32 = 30 * PX;
+/// Matches with a flatter normal than this say nothing about disparity (|n_x| in 1/16384).
+const MIN_NX: i32 = UNIT / 4;
+/// A match this far from the running median along the contour is a wrong one, 1/256 px.
+const OUTLIER: i32 = PX * 3 / 2;
+/// Matches on either side that the running median looks at.
+const MEDIAN_REACH: usize = 4;
+/// Matches on either side that are averaged.
+const AVERAGE_REACH: usize = 3;
+/// The normals of corresponding points differ by less than this (sine, 1/16384: 29 degrees).
+const MAX_TURN: i32 = UNIT * 48 / 100;
+
+/// All crossings of the loops with the rows `v + offset` (1/256 px), ordered by row and column.
+///
+/// `first` gets, for each row and one beyond, where its crossings begin; it has height + 1 entries.
+///
+/// # Errors
+/// A [`CapacityError`] when `crossings` is too short.
+pub fn row_crossings(
+    points: &[ContourPoint],
+    loops: &[ContourLoop],
+    offset: i32,
+    first: &mut [u32],
+    crossings: &mut VecView<RowCrossing>,
+) -> Result<(), CapacityError> {
+    crossings.clear();
+    first.fill(0);
+    let rows = first.len().saturating_sub(1);
+    each_crossing(points, loops, offset, rows, |c| {
+        first[usize::from(c.v) + 1] += 1;
+        push(crossings, c, "row crossings")
+    })?;
+    for v in 0..rows {
+        first[v + 1] += first[v];
+    }
+    // Counting sort in place: `first` moves to each row's end while its crossings arrive, and back.
+    each_crossing(points, loops, offset, rows, |c| {
+        let slot = &mut first[usize::from(c.v)];
+        crossings[*slot as usize] = c;
+        *slot += 1;
+        Ok(())
+    })?;
+    for v in (0..rows).rev() {
+        first[v + 1] = first[v];
+    }
+    if let Some(zeroth) = first.first_mut() {
+        *zeroth = 0;
+    }
+    for v in 0..rows {
+        crossings[first[v] as usize..first[v + 1] as usize].sort_unstable_by_key(|c| (c.u, c.index));
+    }
+    Ok(())
+}
+
+/// Walk along the loops and report where they cross a row.
+fn each_crossing(
+    points: &[ContourPoint],
+    loops: &[ContourLoop],
+    offset: i32,
+    rows: usize,
+    mut report: impl FnMut(RowCrossing) -> Result<(), CapacityError>,
+) -> Result<(), CapacityError> {
+    for l in loops {
+        for i in l.range() {
+            let (a, b) = (points[i].at, points[l.step(i, 1)].at);
+            let (low, high) = (a.v.min(b.v) - offset, a.v.max(b.v) - offset);
+            // The lower end belongs to the segment, the upper one to the next: each row once.
+            let from = low.div_euclid(PX) + i32::from(low.rem_euclid(PX) != 0);
+            let to = high.div_euclid(PX) + i32::from(high.rem_euclid(PX) != 0);
+            for v in from.max(0)..to.min(rows as i32) {
+                let (run, rise) = (v * PX + offset - a.v, b.v - a.v);
+                report(RowCrossing {
+                    v: v as u16,
+                    u: a.lerp(b, run, rise).u,
+                    index: i as u32,
+                    fraction: div_round(i64::from(run) * 255, i64::from(rise)) as u8,
+                    downwards: rise > 0,
+                })?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The crossings of one view, row by row.
+#[derive(Clone, Copy)]
+pub struct Rows<'a> {
+    /// Where each row's crossings begin; one entry more than rows.
+    pub first: &'a [u32],
+    /// All crossings, ordered by row and column.
+    pub crossings: &'a [RowCrossing],
+}
+
+impl<'a> Rows<'a> {
+    /// The crossings of a row, at most [`ROW_CROSSINGS`].
+    pub fn row(&self, v: usize) -> &'a [RowCrossing] {
+        match (self.first.get(v), self.first.get(v + 1)) {
+            (Some(&a), Some(&b)) => {
+                let row = self.crossings.get(a as usize..b as usize).unwrap_or(&[]);
+                &row[..row.len().min(ROW_CROSSINGS)]
+            }
+            _ => &[],
+        }
+    }
+
+    /// Number of rows.
+    pub const fn len(&self) -> usize {
+        self.first.len().saturating_sub(1)
+    }
+
+    /// Whether there is no row.
+    pub const fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// Match the left contour's points to the right view.
+///
+/// `matches` gets one entry a left contour point; `trusted` is scratch for as many.
+///
+/// # Errors
+/// A [`CapacityError`] when `matches` or `trusted` is too short.
+pub fn match_rows(
+    (left_points, left_loops): (&[ContourPoint], &[ContourLoop]),
+    right_points: &[ContourPoint],
+    (left, right): (Rows<'_>, Rows<'_>),
+    plane: &ImagePlane,
+    matches: &mut VecView<ContourMatch>,
+    trusted: &mut VecView<Trusted>,
+) -> Result<RowStatistics, CapacityError> {
+    matches.clear();
+    for p in left_points {
+        let blank = ContourMatch { disparity: plane.at(p.at), weight: 0, normal_right: p.normal };
+        push(matches, blank, "contour matches")?;
+    }
+    let mut statistics = RowStatistics::default();
+    for v in 0..left.len() {
+        let (a, b) = (left.row(v), right.row(v));
+        let paired = align(a, b, plane, |i, j| record(&a[i], &b[j], left_points, right_points, matches));
+        statistics.crossings += a.len() as u32;
+        statistics.unmatched += (a.len() - paired) as u32;
+    }
+    for l in left_loops {
+        trusted.clear();
+        for i in l.range().filter(|&i| matches[i].weight > 0) {
+            let (p, m) = (&left_points[i], &matches[i]);
+            let turn = p.normal.cross(m.normal_right).clamp(-MAX_TURN, MAX_TURN);
+            let excess = m.disparity - plane.at(p.at);
+            push(trusted, Trusted { index: i as u32, excess, turn, weight: m.weight }, "contour matches")?;
+        }
+        reject_outliers(trusted);
+        fill(left_points, *l, plane, trusted, matches);
+    }
+    Ok(statistics)
+}
+
+/// Align two rows of crossings in order at the least cost, report the pairs, return their number.
+fn align(
+    a: &[RowCrossing],
+    b: &[RowCrossing],
+    plane: &ImagePlane,
+    mut pair: impl FnMut(usize, usize),
+) -> usize {
+    #[derive(Clone, Copy, PartialEq)]
+    enum Step {
+        Pair,
+        SkipLeft,
+        SkipRight,
+    }
+    const N: usize = ROW_CROSSINGS + 1;
+    let mut cost = [0i32; N];
+    let mut steps = [[Step::SkipRight; N]; N];
+    for (j, c) in cost.iter_mut().enumerate() {
+        *c = j as i32 * SKIP;
+    }
+    for (i, x) in a.iter().enumerate() {
+        let expected = x.u - plane.at(PixelPoint { u: x.u, v: i32::from(x.v) * PX });
+        let mut diagonal = cost[0];
+        cost[0] += SKIP;
+        steps[i + 1][0] = Step::SkipLeft;
+        for (j, y) in b.iter().enumerate() {
+            let above = cost[j + 1];
+            let (mut best, mut step) = (above + SKIP, Step::SkipLeft);
+            if cost[j] + SKIP < best {
+                (best, step) = (cost[j] + SKIP, Step::SkipRight);
+            }
+            let together = diagonal + (y.u - expected).abs().min(COST_CAP);
+            if x.downwards == y.downwards && together <= best {
+                (best, step) = (together, Step::Pair);
+            }
+            (cost[j + 1], steps[i + 1][j + 1], diagonal) = (best, step, above);
+        }
+    }
+    let (mut i, mut j, mut paired) = (a.len(), b.len(), 0);
+    while i > 0 && j > 0 {
+        match steps[i][j] {
+            Step::Pair => {
+                (i, j, paired) = (i - 1, j - 1, paired + 1);
+                pair(i, j);
+            }
+            Step::SkipLeft => i -= 1,
+            Step::SkipRight => j -= 1,
+        }
+    }
+    paired
+}
+
+/// Note a pair of crossings at the nearer point of the left contour.
+fn record(
+    x: &RowCrossing,
+    y: &RowCrossing,
+    left: &[ContourPoint],
+    right: &[ContourPoint],
+    matches: &mut [ContourMatch],
+) {
+    let (p, q) = (&left[x.index as usize], &right[y.index as usize]);
+    let flatter = i32::from(p.normal.u).abs().min(i32::from(q.normal.u).abs());
+    let here = &mut matches[x.index as usize];
+    let weight = ((flatter * flatter) >> 14) as u16;
+    if flatter >= MIN_NX && !p.border && !q.border && weight > here.weight {
+        *here = ContourMatch { disparity: x.u - y.u, weight, normal_right: q.normal };
+    }
+}
+
+/// Clear the weight of matches that differ from the running median along the loop.
+fn reject_outliers(trusted: &mut VecView<Trusted>) {
+    let n = trusted.len();
+    if n > 2 * MEDIAN_REACH {
+        let mut window = [0i32; 2 * MEDIAN_REACH + 1];
+        for k in 0..n {
+            for (w, slot) in window.iter_mut().enumerate() {
+                *slot = trusted[(k + n + w - MEDIAN_REACH) % n].excess;
+            }
+            window.sort_unstable();
+            // Only the weight changes here, so that every median sees the same neighbours.
+            if (trusted[k].excess - window[MEDIAN_REACH]).abs() > OUTLIER {
+                trusted[k].weight = 0;
+            }
+        }
+    }
+    trusted.retain(|t| t.weight > 0);
+}
+
+/// The average of match `k` and its neighbours within a few pixels of arc: (excess, turn).
+fn averaged(l: ContourLoop, trusted: &[Trusted], k: usize) -> (i32, i32) {
+    let n = trusted.len();
+    let reach = AVERAGE_REACH.min((n - 1) / 2);
+    let (mut excess, mut turn, mut total) = (0i64, 0i64, 0i64);
+    for w in 0..=2 * reach {
+        let t = &trusted[(k + n + w - reach) % n];
+        let ahead = (t.index as usize + l.len - trusted[k].index as usize) % l.len;
+        let apart = ahead.min(l.len - ahead);
+        let weight = i64::from(t.weight) * (AVERAGE_REACH + 1).saturating_sub(apart) as i64;
+        excess += weight * i64::from(t.excess);
+        turn += weight * i64::from(t.turn);
+        total += weight;
+    }
+    (div_round(excess, total) as i32, div_round(turn, total) as i32)
+}
+
+/// Give every point of the loop the averaged excess and turn, linear between trusted matches.
+fn fill(
+    left: &[ContourPoint],
+    l: ContourLoop,
+    plane: &ImagePlane,
+    trusted: &[Trusted],
+    matches: &mut [ContourMatch],
+) {
+    let Some(last) = trusted.len().checked_sub(1) else { return };
+    let (mut from, mut behind) = (trusted[last].index as usize, averaged(l, trusted, last));
+    for (k, t) in trusted.iter().enumerate() {
+        let ahead = averaged(l, trusted, k);
+        // One trusted match alone: once around the loop back to itself.
+        let gap = match (t.index as usize + l.len - from) % l.len {
+            0 => l.len,
+            gap => gap,
+        };
+        for s in 1..=gap {
+            let i = l.step(from, s as isize);
+            let mix = |a: i32, b: i32| a + div_round(i64::from(b - a) * s as i64, gap as i64) as i32;
+            matches[i].disparity = plane.at(left[i].at) + mix(behind.0, ahead.0);
+            matches[i].normal_right = left[i].normal.turned(mix(behind.1, ahead.1));
+            let across = i32::from(matches[i].normal_right.u);
+            matches[i].weight = if left[i].border { 0 } else { ((across * across) >> 14) as u16 };
+        }
+        (from, behind) = (t.index as usize, ahead);
+    }
+}
