@@ -12,7 +12,7 @@
 //! with a twentieth of the plain average, which decides where both contacts run along the rows. A ball's
 //! silhouette is seen r^2 / Z in front of its centre: d_c = d_m f^2 / (f^2 + rho^2).
 //!
-//! * **In**: balls, the matches of the left contour, the focal length.
+//! * **In**: balls, the matches of the left contour, the optics.
 //! * **Out**: a disparity a ball, 1/256 px, and how well it is known.
 //! * **Bounds**: every product below 2^60.
 
@@ -22,6 +22,16 @@ use crate::stage::contour::ContourPoint;
 use crate::stage::medial::MedialBall;
 use crate::stage::rows::ContourMatch;
 use heapless::VecView;
+
+/// What the depth of a ball depends on beside the images.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Optics {
+    /// Focal length of both eyes, 1/256 px; below 2^23.
+    pub focal: i32,
+    /// What is added to a disparity before Z = f B / d holds, 1/256 px: the right principal point's column
+    /// less the left one's.
+    pub disparity_offset: i32,
+}
 
 /// The disparity of a ball's centre.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -35,7 +45,7 @@ pub struct BallDepth {
 /// Weight of the plain average of the contacts against n_x^2, 1/16384.
 const PLAIN: i64 = UNIT as i64 / 20;
 
-/// The disparity of each ball's centre; `focal` is the focal length in 1/256 px.
+/// The disparity of each ball's centre.
 ///
 /// # Errors
 /// A [`CapacityError`] when `depths` is too short.
@@ -43,13 +53,13 @@ pub fn ball_depths(
     balls: &[MedialBall],
     points: &[ContourPoint],
     matches: &[ContourMatch],
-    focal: i32,
+    optics: Optics,
     depths: &mut VecView<BallDepth>,
 ) -> Result<(), CapacityError> {
     depths.clear();
     for ball in balls {
         let [p, q] = ball.contacts.map(|k| (&points[k as usize], &matches[k as usize]));
-        push(depths, depth(ball.rho, p, q, focal), "ball depths")?;
+        push(depths, depth(ball.rho, p, q, optics), "ball depths")?;
     }
     Ok(())
 }
@@ -59,7 +69,7 @@ fn depth(
     rho: i32,
     p: (&ContourPoint, &ContourMatch),
     q: (&ContourPoint, &ContourMatch),
-    focal: i32,
+    optics: Optics,
 ) -> BallDepth {
     let (mut sum, mut total) = (0i64, 0i64);
     for (point, matched) in [p, q] {
@@ -76,8 +86,9 @@ fn depth(
     let (wp, wq) = (i64::from(p.1.weight) + PLAIN, i64::from(q.1.weight) + PLAIN);
     let plain = div_round(wp * dp + wq * dq, wp + wq);
     let matched = div_round(sum + PLAIN * plain, total + PLAIN);
-    let (f2, rho2) = (i64::from(focal).pow(2), i64::from(rho).pow(2));
+    let (f2, rho2) = (i64::from(optics.focal).pow(2), i64::from(rho).pow(2));
     // f^2 / (f^2 + rho^2) in Q2.30: f^2 < 2^46, so the shift stays below i128's range.
     let factor = ((i128::from(f2) << 30) / i128::from((f2 + rho2).max(1))) as i64;
-    BallDepth { disparity: ((matched * factor + (1 << 29)) >> 30) as i32, weight }
+    let offset = i64::from(optics.disparity_offset);
+    BallDepth { disparity: ((((matched + offset) * factor + (1 << 29)) >> 30) - offset) as i32, weight }
 }

@@ -1,0 +1,145 @@
+//! Branches: the medial balls along each edge of the skeleton graph, in order, ready to be described.
+//!
+//! * **In**: the path of an edge in pixels, the medial balls and their depths.
+//! * **Out**: samples (u, v, rho, d) about every pixel of the path.
+//! * **How**: a sample is the average of the balls whose centres lie within 2 px of the path's pixel,
+//!   weighted by (1 - (distance / 2 px)^2)^2. Thinning stops short of the last medial ball by up to a
+//!   radius's change, so a free end is continued along its own direction over the balls that lie ahead.
+//! * **Cost**: path length times number of balls.
+
+use crate::fixed::{PX, div_round};
+use crate::limits::{CapacityError, push};
+use crate::point::{Direction, Pixel, PixelPoint};
+use crate::stage::depth::BallDepth;
+use crate::stage::medial::MedialBall;
+use heapless::VecView;
+
+/// A ball of a branch.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sample {
+    /// Centre.
+    pub at: PixelPoint,
+    /// Radius, 1/256 px.
+    pub rho: i32,
+    /// Disparity of the centre, 1/256 px.
+    pub disparity: i32,
+    /// How well the disparity is known, 0..=16384.
+    pub weight: i32,
+}
+
+/// The medial balls of a view with their depths, in the same order.
+#[derive(Clone, Copy)]
+pub struct Balls<'a> {
+    /// Centres, radii and contacts.
+    pub balls: &'a [MedialBall],
+    /// Disparities.
+    pub depths: &'a [BallDepth],
+}
+
+/// Balls farther than this from a path's pixel do not count, 1/256 px.
+const REACH: i32 = 2 * PX;
+/// How far a free end is continued at most, 1/256 px.
+const TIP_REACH: i32 = 12 * PX;
+/// Samples that an end's direction is taken over.
+const TIP_SPAN: usize = 8;
+
+/// Append the samples of an edge; `free` says which of its ends are end points.
+///
+/// Nothing is appended where no ball is near, which is the case of paths inside spurs that noise made.
+///
+/// # Errors
+/// A [`CapacityError`] when `samples` is too short.
+pub fn trace_branch(
+    path: &[Pixel],
+    free: [bool; 2],
+    balls: Balls<'_>,
+    samples: &mut VecView<Sample>,
+) -> Result<(), CapacityError> {
+    let start = samples.len();
+    for pixel in path {
+        if let Some(sample) = average(pixel.centre(), balls) {
+            push(samples, sample, "branch samples")?;
+        }
+    }
+    if free[1] {
+        continue_tip(start, balls, samples)?;
+    }
+    if free[0] {
+        samples[start..].reverse();
+        continue_tip(start, balls, samples)?;
+        samples[start..].reverse();
+    }
+    Ok(())
+}
+
+/// The weighted average of the balls around a point.
+fn average(at: PixelPoint, balls: Balls<'_>) -> Option<Sample> {
+    let reach_squared = i64::from(REACH).pow(2);
+    let mut sums = [0i64; 5];
+    let mut total = 0;
+    for (ball, depth) in balls.balls.iter().zip(balls.depths) {
+        let near = reach_squared - at.distance_squared(ball.centre);
+        if near > 0 {
+            // At most 2^18 each; 24 bits of their product are kept, so that 2^16 balls fit.
+            let weight = (near * near) >> 12;
+            let values = [ball.centre.u, ball.centre.v, ball.rho, depth.disparity, depth.weight];
+            for (sum, value) in sums.iter_mut().zip(values) {
+                *sum += weight * i64::from(value);
+            }
+            total += weight;
+        }
+    }
+    let [u, v, rho, disparity, weight] = sums.map(|s| div_round(s, total) as i32);
+    (total > 0).then_some(Sample { at: PixelPoint { u, v }, rho, disparity, weight })
+}
+
+/// Continue the samples from `start` beyond the last one, over the balls ahead that do not grow.
+fn continue_tip(start: usize, balls: Balls<'_>, samples: &mut VecView<Sample>) -> Result<(), CapacityError> {
+    let count = samples.len() - start;
+    if count < 5 {
+        return Ok(());
+    }
+    let tip = samples[samples.len() - 1];
+    let behind = samples[samples.len() - 1 - TIP_SPAN.min(count - 1)].at;
+    let Some(direction) = Direction::of(tip.at.u - behind.u, tip.at.v - behind.v) else { return Ok(()) };
+    let across = Direction { u: -direction.v, v: direction.u };
+    let mut reached = PX / 2;
+    loop {
+        let ahead = balls.balls.iter().zip(balls.depths).filter_map(|(ball, depth)| {
+            let along = direction.along(tip.at, ball.centre);
+            let aside = across.along(tip.at, ball.centre).abs();
+            let lies_ahead = along > reached && along < TIP_REACH && aside < PX + along / 10;
+            (lies_ahead && ball.rho <= tip.rho + PX).then_some((along, ball, depth))
+        });
+        let Some((along, ball, depth)) = ahead.min_by_key(|(along, ..)| *along) else { return Ok(()) };
+        let sample =
+            Sample { at: ball.centre, rho: ball.rho, disparity: depth.disparity, weight: depth.weight };
+        push(samples, sample, "branch samples")?;
+        reached = along;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use heapless::Vec;
+
+    #[test]
+    fn a_path_takes_over_the_balls_and_grows_to_the_last_one() {
+        let ball = |k: i32| MedialBall {
+            centre: PixelPoint { u: k * PX / 2, v: 10 * PX + 40 },
+            rho: 5 * PX - 4 * k,
+            contacts: [0, 0],
+        };
+        let balls: Vec<_, 64> = (0..60).map(ball).collect();
+        let depths: Vec<_, 64> =
+            (0..60).map(|k| BallDepth { disparity: 90 * PX + k, weight: 16384 }).collect();
+        let path: Vec<_, 64> = (2..20).map(|u| Pixel { u, v: 10 }).collect();
+        let mut samples = Vec::<_, 64>::new();
+        let all = Balls { balls: &balls, depths: &depths };
+        trace_branch(&path, [false, true], all, &mut samples).unwrap();
+        assert!(samples.iter().all(|s| s.at.v == 10 * PX + 40));
+        assert!(samples.windows(2).all(|w| w[0].at.u < w[1].at.u && w[0].rho > w[1].rho));
+        assert_eq!(samples.last().unwrap().at.u, 59 * PX / 2, "the last ball");
+    }
+}
