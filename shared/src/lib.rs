@@ -3,8 +3,10 @@
 #![forbid(unsafe_code)]
 
 pub mod bitmap;
+pub mod envelope;
 pub mod fixed;
 pub mod limits;
+pub mod pattern;
+pub mod pipeline;
 pub mod point;
-
 pub mod stage;

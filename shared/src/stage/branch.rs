@@ -7,24 +7,49 @@
 //!   radius's change, so a free end is continued along its own direction over the balls that lie ahead.
 //! * **Cost**: path length times number of balls.
 
-use crate::fixed::{PX, div_round};
+use crate::bitmap::Plane;
+use crate::fixed::{ONE, PX, UNIT, div_round};
 use crate::limits::{CapacityError, push};
 use crate::point::{Direction, Pixel, PixelPoint};
 use crate::stage::depth::BallDepth;
+use crate::stage::distance::DISTANCE_PX;
 use crate::stage::medial::MedialBall;
 use heapless::VecView;
 
-/// A ball of a branch.
+/// A ball of the skeleton in the left image, 1/256 px.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Ball {
+    /// Horizontal coordinate of the centre.
+    pub u: i32,
+    /// Vertical coordinate of the centre.
+    pub v: i32,
+    /// Radius.
+    pub rho: i32,
+    /// Disparity of the centre.
+    pub d: i32,
+}
+
+impl Ball {
+    /// Its centre.
+    pub const fn at(self) -> PixelPoint {
+        PixelPoint { u: self.u, v: self.v }
+    }
+}
+
+/// A ball of a branch, and how well its disparity is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sample {
-    /// Centre.
-    pub at: PixelPoint,
-    /// Radius, 1/256 px.
-    pub rho: i32,
-    /// Disparity of the centre, 1/256 px.
-    pub disparity: i32,
-    /// How well the disparity is known, 0..=16384.
+    /// The ball.
+    pub ball: Ball,
+    /// 0..=65536; a fit takes it as at least 1/64.
     pub weight: i32,
+}
+
+impl Sample {
+    fn of(ball: &MedialBall, depth: &BallDepth) -> Self {
+        let (PixelPoint { u, v }, rho, d) = (ball.centre, ball.rho, depth.disparity);
+        Self { ball: Ball { u, v, rho, d }, weight: depth.weight * (ONE / UNIT) }
+    }
 }
 
 /// The medial balls of a view with their depths, in the same order.
@@ -72,6 +97,25 @@ pub fn trace_branch(
     Ok(())
 }
 
+/// Append the pixels of a path as they are, with the distance to the background as radius and no
+/// disparity: the paper's description of one view's skeleton.
+///
+/// # Errors
+/// A [`CapacityError`] when `samples` is too short.
+pub fn trace_pixels(
+    path: &[Pixel],
+    distance: &Plane<'_, u16>,
+    samples: &mut VecView<Sample>,
+) -> Result<(), CapacityError> {
+    for pixel in path {
+        let PixelPoint { u, v } = pixel.centre();
+        let rho =
+            i32::from(distance.get(i32::from(pixel.u), i32::from(pixel.v))) * PX / i32::from(DISTANCE_PX);
+        push(samples, Sample { ball: Ball { u, v, rho, d: 0 }, weight: ONE }, "branch samples")?;
+    }
+    Ok(())
+}
+
 /// The weighted average of the balls around a point.
 fn average(at: PixelPoint, balls: Balls<'_>) -> Option<Sample> {
     let reach_squared = i64::from(REACH).pow(2);
@@ -82,15 +126,15 @@ fn average(at: PixelPoint, balls: Balls<'_>) -> Option<Sample> {
         if near > 0 {
             // At most 2^18 each; 24 bits of their product are kept, so that 2^16 balls fit.
             let weight = (near * near) >> 12;
-            let values = [ball.centre.u, ball.centre.v, ball.rho, depth.disparity, depth.weight];
-            for (sum, value) in sums.iter_mut().zip(values) {
+            let Sample { ball: Ball { u, v, rho, d }, weight: trust } = Sample::of(ball, depth);
+            for (sum, value) in sums.iter_mut().zip([u, v, rho, d, trust]) {
                 *sum += weight * i64::from(value);
             }
             total += weight;
         }
     }
-    let [u, v, rho, disparity, weight] = sums.map(|s| div_round(s, total) as i32);
-    (total > 0).then_some(Sample { at: PixelPoint { u, v }, rho, disparity, weight })
+    let [u, v, rho, d, weight] = sums.map(|s| div_round(s, total) as i32);
+    (total > 0).then_some(Sample { ball: Ball { u, v, rho, d }, weight })
 }
 
 /// Continue the samples from `start` beyond the last one, over the balls ahead that do not grow.
@@ -99,22 +143,20 @@ fn continue_tip(start: usize, balls: Balls<'_>, samples: &mut VecView<Sample>) -
     if count < 5 {
         return Ok(());
     }
-    let tip = samples[samples.len() - 1];
-    let behind = samples[samples.len() - 1 - TIP_SPAN.min(count - 1)].at;
-    let Some(direction) = Direction::of(tip.at.u - behind.u, tip.at.v - behind.v) else { return Ok(()) };
+    let tip = samples[samples.len() - 1].ball;
+    let behind = samples[samples.len() - 1 - TIP_SPAN.min(count - 1)].ball;
+    let Some(direction) = Direction::of(tip.u - behind.u, tip.v - behind.v) else { return Ok(()) };
     let across = Direction { u: -direction.v, v: direction.u };
     let mut reached = PX / 2;
     loop {
         let ahead = balls.balls.iter().zip(balls.depths).filter_map(|(ball, depth)| {
-            let along = direction.along(tip.at, ball.centre);
-            let aside = across.along(tip.at, ball.centre).abs();
+            let along = direction.along(tip.at(), ball.centre);
+            let aside = across.along(tip.at(), ball.centre).abs();
             let lies_ahead = along > reached && along < TIP_REACH && aside < PX + along / 10;
             (lies_ahead && ball.rho <= tip.rho + PX).then_some((along, ball, depth))
         });
         let Some((along, ball, depth)) = ahead.min_by_key(|(along, ..)| *along) else { return Ok(()) };
-        let sample =
-            Sample { at: ball.centre, rho: ball.rho, disparity: depth.disparity, weight: depth.weight };
-        push(samples, sample, "branch samples")?;
+        push(samples, Sample::of(ball, depth), "branch samples")?;
         reached = along;
     }
 }
@@ -138,8 +180,8 @@ mod tests {
         let mut samples = Vec::<_, 64>::new();
         let all = Balls { balls: &balls, depths: &depths };
         trace_branch(&path, [false, true], all, &mut samples).unwrap();
-        assert!(samples.iter().all(|s| s.at.v == 10 * PX + 40));
-        assert!(samples.windows(2).all(|w| w[0].at.u < w[1].at.u && w[0].rho > w[1].rho));
-        assert_eq!(samples.last().unwrap().at.u, 59 * PX / 2, "the last ball");
+        assert!(samples.iter().all(|s| s.ball.v == 10 * PX + 40));
+        assert!(samples.windows(2).all(|w| w[0].ball.u < w[1].ball.u && w[0].ball.rho > w[1].ball.rho));
+        assert_eq!(samples.last().unwrap().ball.u, 59 * PX / 2, "the last ball");
     }
 }
