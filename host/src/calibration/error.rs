@@ -59,7 +59,7 @@ pub enum CalibrationError {
     },
     /// The keys belong to none of the formats.
     #[error(
-        "{place}: no calibration format has these keys; give OpenCV's M1 D1 M2 D2 R T, a pair of ROS \
+        "{place}: no calibration format has these keys; give OpenCV's M1 D1 M2 D2 R T (as YAML), a pair of ROS \
          camera_info files, or a Kalibr camchain with cam0 and cam1"
     )]
     UnknownFormat {

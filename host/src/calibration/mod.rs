@@ -17,7 +17,7 @@ mod yaml;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-use nalgebra::{Matrix3, Point2, Rotation3, Vector3};
+use nalgebra::{Matrix3, Point2, Rotation3, UnitQuaternion, Vector3};
 
 pub use error::{CalibrationError, Place};
 pub use lens::Distortion;
@@ -69,6 +69,16 @@ impl Camera {
         let y = (pixel.y - self.cy) / self.fy;
         let x = (pixel.x - self.cx - self.skew * y) / self.fx;
         self.distortion.remove(Point2::new(x, y))
+    }
+
+    /// Holds an image of `width` x `height` px against the calibration.
+    ///
+    /// # Errors
+    ///
+    /// [`CalibrationError::Size`], which names both sizes.
+    pub fn check_size(&self, width: u32, height: u32) -> Result<(), CalibrationError> {
+        let (calibrated, images) = ((self.width, self.height), (width, height));
+        if calibrated == images { Ok(()) } else { Err(CalibrationError::Size { calibrated, images }) }
     }
 
     /// From fx, fy, cx, cy in `matrix` and `distortion`.
@@ -166,12 +176,8 @@ impl StereoCamera {
     ///
     /// [`CalibrationError::Size`], which names both sizes.
     pub fn check_size(&self, width: u32, height: u32) -> Result<(), CalibrationError> {
-        let images = (width, height);
-        match [self.left, self.right].map(|camera| (camera.width, camera.height)) {
-            [left, _] if left != images => Err(CalibrationError::Size { calibrated: left, images }),
-            [_, right] if right != images => Err(CalibrationError::Size { calibrated: right, images }),
-            _ => Ok(()),
-        }
+        self.left.check_size(width, height)?;
+        self.right.check_size(width, height)
     }
 
     /// Whether the cameras stand side by side, in millimetres, and in the right order. What `read` and
@@ -203,7 +209,9 @@ impl StereoCamera {
 
     /// The rotation from left axes to those halfway between the eyes, and the translation in the latter.
     pub(crate) fn halfway(&self) -> (Rotation3<f64>, Vector3<f64>) {
-        let half_turn = Rotation3::new(Rotation3::from_matrix_unchecked(self.rotation).scaled_axis() / 2.0);
+        // By way of a quaternion: the angle of a small rotation is lost in the cosine on its diagonal.
+        let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(self.rotation));
+        let half_turn = turn.powf(0.5).to_rotation_matrix();
         (half_turn, half_turn.inverse() * self.translation)
     }
 
