@@ -258,7 +258,7 @@ fn the_turns_are_those_of_opencv() {
             0.047_951_634_2, 0.000_089_854_067_5, 0.998_849_655,
         ),
     );
-    let translation = Vector3::new(-55.108_311_242_100_21, -0.460_382_677_359_277_2, 2.645_618_324_512_270_2);
+    let translation = Vector3::new(-55.108_311_242_100_21, -0.460_382_677_359_277_2, 2.645_618_324_512_27);
     let pair = StereoCamera { left: camera, right: camera, rotation, translation };
     let turns = bouguet(&pair);
     assert!((turns[0].matrix() - left).amax() < 2e-9 && (turns[1].matrix() - right).amax() < 2e-9);
