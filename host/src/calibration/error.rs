@@ -59,8 +59,8 @@ pub enum CalibrationError {
     },
     /// The keys belong to none of the formats.
     #[error(
-        "{place}: no calibration format has these keys; give OpenCV's M1 D1 M2 D2 R T (as YAML), a pair of ROS \
-         camera_info files, or a Kalibr camchain with cam0 and cam1"
+        "{place}: no calibration format has these keys; give OpenCV's M1 D1 M2 D2 R T (as YAML), a pair of \
+         ROS camera_info files, or a Kalibr camchain with cam0 and cam1"
     )]
     UnknownFormat {
         /// The file.
@@ -68,7 +68,8 @@ pub enum CalibrationError {
     },
     /// One ROS file came alone.
     #[error(
-        "{place}: this is one camera of a ROS pair; give the folder of left.yaml and right.yaml, or `left.yaml,right.yaml`"
+        "{place}: this is one camera of a ROS pair; give the folder of left.yaml and right.yaml, or \
+         `left.yaml,right.yaml`"
     )]
     OneEye {
         /// The file.
@@ -94,7 +95,8 @@ pub enum CalibrationError {
     },
     /// A value is NaN or infinite.
     #[error(
-        "{place}: `{key}` holds a number that is not finite; the calibration did not converge, so calibrate again"
+        "{place}: `{key}` holds a number that is not finite; the calibration did not converge, so \
+         calibrate again"
     )]
     NotFinite {
         /// Line of the number itself.
@@ -138,8 +140,8 @@ pub enum CalibrationError {
     NoBaseline,
     /// The right camera stands left of the left one.
     #[error(
-        "the eyes are swapped: the right camera stands {mm:.1} mm to the left of the left one (T[0] should be \
-         negative); exchange the images and the cameras"
+        "the eyes are swapped: the right camera stands {mm:.1} mm to the left of the left one (T[0] should \
+         be negative); exchange the images and the cameras"
     )]
     Swapped {
         /// By how much, mm.
@@ -159,7 +161,8 @@ pub enum CalibrationError {
     /// The cameras stand behind one another, or look apart.
     #[error(
         "the cameras do not look side by side: they are turned by {turn_degrees:.0} degrees against each \
-         other and the baseline leans {lean_degrees:.0} degrees out of the image plane; at most 60 and 45 can be rectified"
+         other and the baseline leans {lean_degrees:.0} degrees out of the image plane; at most \
+         60 and 45 can be rectified"
     )]
     NotSideBySide {
         /// Angle of the rotation between the cameras, degrees.
@@ -178,7 +181,8 @@ pub enum CalibrationError {
     },
     /// The images have another size than those of the calibration.
     #[error(
-        "the calibration is for {}x{} images, but these are {}x{}; calibrate at this resolution, or record at that one",
+        "the calibration is for {}x{} images, but these are {}x{}; calibrate at this resolution, or \
+         record at that one",
         calibrated.0, calibrated.1, images.0, images.1
     )]
     Size {

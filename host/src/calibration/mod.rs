@@ -27,6 +27,8 @@ use yaml::{Document, Field};
 const MAX_BYTES: u64 = 1 << 20;
 /// What a rotation may lack of being one: files hold as few as 4 decimals.
 const ROTATION_TOLERANCE: f64 = 1e-3;
+/// Below this a matrix is left as it is, so that reading what was written changes no bit.
+const ROTATION_ROUNDING: f64 = 1e-12;
 /// Distances between the eyes that can be millimetres, mm.
 const BASELINES_MM: std::ops::RangeInclusive<f64> = 1.0..=1000.0;
 /// Beyond these, rectified images would be mostly stretched border.
@@ -81,7 +83,7 @@ impl Camera {
         if calibrated == images { Ok(()) } else { Err(CalibrationError::Size { calibrated, images }) }
     }
 
-    /// From fx, fy, cx, cy in `matrix` and `distortion`.
+    /// From a camera matrix, which stands at `source`, and a lens.
     fn new(
         (width, height): (u32, u32),
         matrix: &Matrix3<f64>,
@@ -240,7 +242,7 @@ fn rotation_near(matrix: &Matrix3<f64>, source: Field<'_>) -> Result<Matrix3<f64
     }
     let svd = matrix.svd(true, true);
     match (svd.u, svd.v_t) {
-        _ if defect < f64::EPSILON * 8.0 => Ok(*matrix),
+        _ if defect < ROTATION_ROUNDING => Ok(*matrix),
         (Some(u), Some(v_t)) => Ok(u * v_t),
         _ => Err(source.not_a_rotation()),
     }

@@ -25,8 +25,10 @@
 mod canvas;
 mod resample;
 
+use std::fmt;
+
 use image::GrayImage;
-use nalgebra::{Point2, Point3, Rotation3, Vector3};
+use nalgebra::{Matrix3, Point2, Point3, Rotation3, Vector3};
 
 use crate::calibration::{CalibrationError, Camera, StereoCamera};
 
@@ -43,6 +45,15 @@ pub enum Eye {
     Left,
     /// The right camera.
     Right,
+}
+
+impl fmt::Display for Eye {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        out.write_str(match self {
+            Self::Left => "left",
+            Self::Right => "right",
+        })
+    }
 }
 
 /// A box in an image, edges included, px. Pixel centres are integers.
@@ -62,7 +73,7 @@ pub enum RectifyError {
     Calibration(#[from] CalibrationError),
     /// The lens model has no inverse there.
     #[error(
-        "the lens model of the {eye:?} camera folds over at pixel ({u:.0}, {v:.0}); calibrate with views that \
+        "the lens model of the {eye} camera folds over at pixel ({u:.0}, {v:.0}); calibrate with views that \
          reach the corners, or keep the object nearer to the centre"
     )]
     Lens {
@@ -75,7 +86,8 @@ pub enum RectifyError {
     },
     /// A ray of the object stands at right angles to the rectified axis or beyond.
     #[error(
-        "the {eye:?} camera sees the object more than 80 degrees from the rectified axis; turn the cameras less"
+        "the {eye} camera sees the object more than 80 degrees from the rectified axis; turn the cameras \
+         less"
     )]
     Aside {
         /// The camera.
@@ -292,10 +304,7 @@ impl Rectification {
 fn already_rectified(pair: &StereoCamera) -> Option<RectifiedCamera> {
     let StereoCamera { left, right, rotation, translation } = pair;
     let near = |a: f64, b: f64| (a - b).abs() <= RECTIFIED_TOLERANCE * left.fx;
-    let aligned = rotation
-        .iter()
-        .zip(nalgebra::Matrix3::<f64>::identity().iter())
-        .all(|(a, b)| (a - b).abs() <= RECTIFIED_TOLERANCE)
+    let aligned = (rotation - Matrix3::identity()).amax() <= RECTIFIED_TOLERANCE
         && translation.yz().amax() <= RECTIFIED_TOLERANCE * translation.norm();
     let same = near(left.fx, left.fy)
         && near(left.fx, right.fx)

@@ -1,7 +1,6 @@
 //! Rows, depths and pictures of rectified pairs, held against the raw cameras alone.
 
 use image::Luma;
-use nalgebra::Matrix3;
 
 use super::*;
 use crate::calibration::Distortion;
