@@ -15,7 +15,7 @@
 //! decimated, unless the canvas would exceed [`MAX_SIDE`].
 //!
 //! The canvas is centred on the object, which fills at most half of it in each direction: a verged pair
-//! of long lenses can see its object thousands of pixels from the rectified axes. Both eyes share one
+//! of long lenses can see its object hundreds of pixels from the rectified axes. Both eyes share one
 //! principal point if that fits; if not, the right one's column differs, see
 //! [`RectifiedCamera::disparity_offset`]. Pixels from outside the source repeat its border: a plain
 //! background stays plain, and an object that touches the border of its image reaches that of the canvas.
