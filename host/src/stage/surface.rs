@@ -139,6 +139,23 @@ mod tests {
     }
 
     #[test]
+    fn any_number_of_threads_gives_the_same_bits() {
+        let at = |i: i32| Point3::new(f64::from(i * 7 % 31), f64::from(i * 11 % 29), f64::from(i * 5 % 23));
+        let cones: Vec<_> =
+            (0..40).map(|i| RoundCone { centres: [at(i), at(i + 1)], radii: [1.5, 2.5] }).collect();
+        let on = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| surface(&cones, 0.5).unwrap())
+        };
+        let bits = |mesh: &Mesh| -> Vec<u64> {
+            mesh.vertices.iter().flat_map(|p| p.iter().map(|x| x.to_bits()).collect::<Vec<_>>()).collect()
+        };
+        let (one, many) = (on(1), on(7));
+        assert_eq!(one.faces, many.faces);
+        assert_eq!(bits(&one), bits(&many));
+    }
+
+    #[test]
     fn a_ball_of_60_mm_is_met_within_20_micrometres() {
         let mesh = surface(&[ball(0.0, 60.0)], 2.0).unwrap();
         let off = |p: Point3<f64>| (p.coords.norm() - 60.0).abs();

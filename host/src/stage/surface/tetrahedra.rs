@@ -10,7 +10,7 @@
 //! What two blocks share they find with the same bits: signs and vertices depend on the nearest cones
 //! alone, and neither block lacks one of those.
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 use super::{
     block::{Block, Lattice, MAX_SHIFT, SIDE, SLACK},
@@ -40,6 +40,10 @@ const MAX_STEPS: usize = 40;
 /// A vertex stays this share of its edge off the ends even where no point could be moved clear of the
 /// surface, as on a ball smaller than [`CLEAR`].
 const END: f64 = 0.02;
+
+/// Beyond this distance of the surface, in cubes, the next point a cube further is on the same side, and
+/// is at no end of an edge that the surface cuts: those are up to a cube and two shifts long.
+const FAR: f64 = 2.0 + 2.0 * MAX_SHIFT + SLACK;
 
 /// Lattice coordinates from -1 to `2 * SIDE + 1` belong to a block's tetrahedra.
 const ALONG: i32 = 2 * SIDE + 3;
@@ -78,8 +82,10 @@ pub(super) fn cut(lattice: &Lattice, block: &Block, distances: &[Distance]) -> P
 #[derive(Clone, Copy)]
 struct Site {
     position: Point3<f64>,
-    /// Signed distance there, mm.
+    /// Signed distance there, mm; of a point further off than [`FAR`] only the sign, and a bound.
     distance: f64,
+    /// Place of the cone that decides it in [`Nearby`].
+    cone: usize,
 }
 
 impl Site {
@@ -102,15 +108,22 @@ impl<'a> Cutter<'a> {
     fn new(lattice: &'a Lattice, block: &Block, distances: &[Distance]) -> Self {
         let nearby = Nearby::new(lattice, block, distances);
         let slots = (ALONG * STRIDE * STRIDE) as usize;
-        let unseen = Site { position: Point3::origin(), distance: f64::INFINITY };
-        let mut sites = vec![unseen; slots];
-        let range = || -1..ALONG - 1;
-        for x in range() {
-            for y in range().filter(|y| (x - y) % 2 == 0) {
-                for z in range().filter(|z| (x - z) % 2 == 0) {
-                    let point = offset(block.corner, [x, y, z]);
-                    sites[slot([x, y, z])] = nearby.site(lattice.position(point), lattice.cube * CLEAR);
-                }
+        let mut site = Site { position: Point3::origin(), distance: 0.0, cone: 0 };
+        let mut sites = vec![site; slots];
+        for (x, y) in (-1..ALONG - 1).flat_map(|x| (-1..ALONG - 1).map(move |y| (x, y))) {
+            if (x - y) % 2 != 0 {
+                continue;
+            }
+            let first = -(x.abs() % 2);
+            for z in (first..ALONG - 1).step_by(2) {
+                let position = lattice.position(offset(block.corner, [x, y, z]));
+                site = if z > first && site.distance.abs() > lattice.cube * FAR {
+                    let distance = site.distance - lattice.cube.copysign(site.distance);
+                    Site { position, distance, ..site }
+                } else {
+                    nearby.site(position, site.cone, lattice.cube * CLEAR)
+                };
+                sites[slot([x, y, z])] = site;
             }
         }
         let patch = Patch { names: Vec::new(), vertices: Vec::new(), faces: Vec::new() };
@@ -209,8 +222,11 @@ struct Nearby {
 }
 
 struct Near {
-    /// Signed distance of the block's middle, mm.
+    /// Signed distance of the block's middle, mm, less an allowance for rounding.
     from_middle: f64,
+    /// How that grows from the middle, per mm. A round cone is convex, and so is the distance to it:
+    /// going on straight from the middle gives a distance that is nowhere too large.
+    growth: Vector3<f64>,
     /// Place in the list of all cones.
     index: u32,
     distance: Distance,
@@ -220,49 +236,64 @@ impl Nearby {
     fn new(lattice: &Lattice, block: &Block, distances: &[Distance]) -> Self {
         let near = |&index: &u32| {
             let distance = distances[index as usize];
-            // Less the slack for rounding in the comparison that it serves below.
-            Near { from_middle: distance.at(&block.middle) - lattice.cube * SLACK, index, distance }
+            let from_middle = distance.at(&block.middle) - lattice.cube * SLACK;
+            match distance.outward(&block.middle) {
+                Some(growth) => Near { from_middle, growth, index, distance },
+                // Of a cone around the middle nothing better is known than the way walked.
+                None => Near {
+                    from_middle: from_middle - lattice.reach(1),
+                    growth: Vector3::zeros(),
+                    index,
+                    distance,
+                },
+            }
         };
         let mut cones: Vec<Near> = block.cones.iter().map(near).collect();
         cones.sort_by(|a, b| a.from_middle.total_cmp(&b.from_middle));
         Self { middle: block.middle, cones }
     }
 
-    /// Signed distance of `p` and the cone that decides it, of equals the first in the list of all.
-    fn nearest(&self, p: &Point3<f64>) -> (f64, &Distance) {
-        let walked = (p - self.middle).norm();
-        let mut best = (f64::INFINITY, u32::MAX);
-        let mut decides = &self.cones[0].distance;
-        for near in &self.cones {
-            if near.from_middle - walked > best.0 {
+    /// Signed distance of `p` and the place here of the cone that decides it: of equals, the first in the
+    /// list of all. A good `guess` at that place saves time and changes nothing else.
+    fn nearest(&self, p: &Point3<f64>, guess: usize) -> (f64, usize) {
+        let walk = p - self.middle;
+        let walked = walk.norm();
+        let mut place = guess;
+        let mut least = self.cones[guess].distance.at(p);
+        for (other, near) in self.cones.iter().enumerate() {
+            if near.from_middle - walked > least {
                 break;
             }
-            let candidate = (near.distance.at(p), near.index);
-            if candidate < best {
-                best = candidate;
-                decides = &near.distance;
+            if near.from_middle + near.growth.dot(&walk) > least {
+                continue;
+            }
+            let distance = near.distance.at(p);
+            if (distance, near.index) < (least, self.cones[place].index) {
+                (least, place) = (distance, other);
             }
         }
-        (best.0, decides)
+        (least, place)
     }
 
     /// The lattice point at `position`, moved until it is `clear` mm off the surface.
-    fn site(&self, position: Point3<f64>, clear: f64) -> Site {
-        let (distance, cone) = self.nearest(&position);
-        let unmoved = Site { position, distance };
+    fn site(&self, position: Point3<f64>, guess: usize, clear: f64) -> Site {
+        let (distance, cone) = self.nearest(&position, guess);
+        let unmoved = Site { position, distance, cone };
         if distance.abs() >= clear {
             return unmoved;
         }
-        let Some(outward) = cone.outward(&position) else {
+        let Some(outward) = self.cones[cone].distance.outward(&position) else {
             return unmoved;
         };
         // Away from the surface; but from a crease outward there is no getting away, only inward.
-        [clear.copysign(distance), -clear]
-            .map(|target| position + outward * (target - distance))
-            .map(|position| Site { position, distance: self.nearest(&position).0 })
-            .into_iter()
-            .find(|moved| moved.distance.abs() > 0.99 * clear)
-            .unwrap_or(unmoved)
+        for target in [clear.copysign(distance), -clear] {
+            let position = position + outward * (target - distance);
+            let (distance, cone) = self.nearest(&position, cone);
+            if distance.abs() > 0.99 * clear {
+                return Site { position, distance, cone };
+            }
+        }
+        unmoved
     }
 
     /// A point on the surface between two sites on different sides of it, by the Illinois variant of
@@ -270,10 +301,11 @@ impl Nearby {
     fn crossing(&self, from: &Site, to: &Site, exact: f64) -> Point3<f64> {
         let at = |share: f64| from.position + (to.position - from.position) * share;
         let (mut low, mut high) = ((0.0, from.distance), (1.0, to.distance));
-        let mut share = 0.5;
+        let (mut share, mut cone) = (0.5, from.cone);
         for _ in 0..MAX_STEPS {
             share = (low.0 * high.1 - high.0 * low.1) / (high.1 - low.1);
-            let distance = self.nearest(&at(share)).0;
+            let distance;
+            (distance, cone) = self.nearest(&at(share), cone);
             if distance.abs() <= exact {
                 break;
             }
