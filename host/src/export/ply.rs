@@ -1,0 +1,177 @@
+//! PLY files (G. Turk, "The PLY Polygon File Format", 1994), binary little-endian.
+//!
+//! A mesh has `element vertex` with float32 `x y z` and `element face` with an int32 list
+//! `vertex_indices`; points have float32 `x y z`, then one float32 property a scalar, and `element edge`
+//! with int32 `vertex1 vertex2` where they are a curve.
+
+use std::{
+    io::{self, Write},
+    path::Path,
+};
+
+use nalgebra::Point3;
+
+use super::{ExportError, write_whole};
+use crate::mesh::Mesh;
+
+/// Points with what is known at each, and the edges between them if they are a curve.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Points<'a> {
+    /// Positions, mm.
+    pub positions: &'a [Point3<f64>],
+    /// Named values, one a point, in units that the name's reader knows (a `radius` is in mm).
+    pub scalars: &'a [(&'a str, &'a [f64])],
+    /// Pairs of indices into `positions`.
+    pub edges: &'a [[u32; 2]],
+}
+
+/// Writes a mesh. `comments` go to the header, a line each.
+///
+/// # Errors
+///
+/// If the file cannot be written, or has more than 2^31 - 1 vertices or faces, or a comment has a line
+/// break.
+pub fn write_mesh(path: &Path, mesh: &Mesh, comments: &[&str]) -> Result<(), ExportError> {
+    let counts = [("vertices", mesh.vertices.len()), ("faces", mesh.faces.len())];
+    check(path, comments, &counts, mesh.faces.as_flattened(), mesh.vertices.len())?;
+    write_whole(path, |file| {
+        begin(file, comments, mesh.vertices.len())?;
+        writeln!(file, "element face {}", mesh.faces.len())?;
+        writeln!(file, "property list uchar int vertex_indices\nend_header")?;
+        for vertex in &mesh.vertices {
+            floats(file, vertex.iter())?;
+        }
+        for face in &mesh.faces {
+            file.write_all(&[3])?;
+            indices(file, face)?;
+        }
+        Ok(())
+    })
+}
+
+/// Writes points, or a curve. `comments` go to the header, a line each.
+///
+/// # Errors
+///
+/// As [`write_mesh`]; and if a scalar's name is not one word or its values are not one a point.
+pub fn write_points(path: &Path, points: &Points, comments: &[&str]) -> Result<(), ExportError> {
+    let count = points.positions.len();
+    let counts = [("points", count), ("edges", points.edges.len())];
+    check(path, comments, &counts, points.edges.as_flattened(), count)?;
+    for (name, values) in points.scalars {
+        let one_word = !name.is_empty() && name.chars().all(|c| c.is_ascii_graphic());
+        if !one_word || values.len() != count {
+            let what = format!("the scalar \"{name}\" is not one word with {count} values");
+            return Err(ExportError::Content { path: path.to_path_buf(), what });
+        }
+    }
+    write_whole(path, |file| {
+        begin(file, comments, count)?;
+        for (name, _) in points.scalars {
+            writeln!(file, "property float {name}")?;
+        }
+        if !points.edges.is_empty() {
+            writeln!(file, "element edge {}", points.edges.len())?;
+            writeln!(file, "property int vertex1\nproperty int vertex2")?;
+        }
+        writeln!(file, "end_header")?;
+        for (i, position) in points.positions.iter().enumerate() {
+            floats(file, position.iter().chain(points.scalars.iter().map(|(_, values)| &values[i])))?;
+        }
+        points.edges.iter().try_for_each(|edge| indices(file, edge))
+    })
+}
+
+/// Refuses what the header or an int32 cannot say, and indices that lead nowhere.
+fn check(
+    path: &Path,
+    comments: &[&str],
+    counts: &[(&str, usize)],
+    indices: &[u32],
+    vertices: usize,
+) -> Result<(), ExportError> {
+    let refuse = |what| Err(ExportError::Content { path: path.to_path_buf(), what });
+    if let Some((what, count)) = counts.iter().find(|&&(_, count)| i32::try_from(count).is_err()) {
+        return refuse(format!("{count} {what} are more than the format can number"));
+    }
+    if let Some(comment) = comments.iter().find(|comment| comment.contains(['\n', '\r'])) {
+        return refuse(format!("the comment {comment:?} has a line break"));
+    }
+    if let Some(index) = indices.iter().find(|&&index| index as usize >= vertices) {
+        return refuse(format!("vertex {index} is named, but there are only {vertices}"));
+    }
+    Ok(())
+}
+
+fn begin(file: &mut impl Write, comments: &[&str], vertices: usize) -> io::Result<()> {
+    writeln!(file, "ply\nformat binary_little_endian 1.0")?;
+    for comment in comments {
+        writeln!(file, "comment {comment}")?;
+    }
+    writeln!(file, "element vertex {vertices}\nproperty float x\nproperty float y\nproperty float z")
+}
+
+fn floats<'a>(file: &mut impl Write, values: impl Iterator<Item = &'a f64>) -> io::Result<()> {
+    for &value in values {
+        file.write_all(&(value as f32).to_le_bytes())?;
+    }
+    Ok(())
+}
+
+fn indices(file: &mut impl Write, values: &[u32]) -> io::Result<()> {
+    values.iter().try_for_each(|value| file.write_all(&value.to_le_bytes()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::read::read;
+
+    fn triangle() -> Mesh {
+        let vertices = [[0.0, 0.5, 1.0], [2.0, -3.0, 4.0], [100.25, 0.0, 1e-3]].map(Point3::from).to_vec();
+        Mesh { vertices, faces: vec![[0, 1, 2], [2, 1, 0]] }
+    }
+
+    #[test]
+    fn a_mesh_comes_back_as_it_was_in_single_precision() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mesh.ply");
+        write_mesh(&path, &triangle(), &["unit mm", "one more"]).unwrap();
+        let mut expected = triangle();
+        expected.vertices[2].z = f64::from(1e-3_f32);
+        assert_eq!(read(&path).unwrap(), expected);
+    }
+
+    #[test]
+    fn the_bytes_of_a_curve_are_these() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("skeleton.ply");
+        let positions = [Point3::new(1.0, 2.0, 3.0), Point3::new(0.0, 0.0, 0.0)];
+        let points = Points { positions: &positions, scalars: &[("radius", &[4.0, 0.5])], edges: &[[0, 1]] };
+        write_points(&path, &points, &["unit mm"]).unwrap();
+        let mut expected = b"ply\nformat binary_little_endian 1.0\ncomment unit mm\nelement vertex 2\n\
+            property float x\nproperty float y\nproperty float z\nproperty float radius\n\
+            element edge 1\nproperty int vertex1\nproperty int vertex2\nend_header\n"
+            .to_vec();
+        expected.extend([1.0_f32, 2.0, 3.0, 4.0, 0.0, 0.0, 0.0, 0.5].map(f32::to_le_bytes).as_flattened());
+        expected.extend([0, 0, 0, 0, 1, 0, 0, 0]);
+        assert_eq!(std::fs::read(&path).unwrap(), expected);
+    }
+
+    #[test]
+    fn refuses_contradictions_and_writes_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("bad.ply");
+        let mut mesh = triangle();
+        assert!(write_mesh(&path, &mesh, &["two\nlines"]).is_err());
+        mesh.faces[0][1] = 3;
+        let error = write_mesh(&path, &mesh, &[]).unwrap_err().to_string();
+        assert!(error.ends_with("bad.ply: vertex 3 is named, but there are only 3"), "{error}");
+        let positions = [Point3::origin()];
+        for scalar in [("radius", &[][..]), ("two words", &[1.0][..]), ("", &[1.0][..])] {
+            let points = Points { positions: &positions, scalars: &[scalar], edges: &[] };
+            assert!(write_points(&path, &points, &[]).is_err());
+        }
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+}

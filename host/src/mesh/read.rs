@@ -1,0 +1,125 @@
+//! Meshes from files: PLY, OBJ and STL, told apart by their extension.
+//!
+//! Polygons become fans of triangles around their first corner. No bytes cause a panic, and no header
+//! makes the reader allocate more than the file's own size warrants.
+
+mod obj;
+mod ply;
+mod stl;
+
+use std::{
+    io::{self, Read},
+    path::{Path, PathBuf},
+};
+
+use thiserror::Error;
+
+use super::Mesh;
+
+/// The largest file that is read, bytes: about ten times a binary mesh of a million faces.
+const MAX_BYTES: u64 = 1 << 28;
+
+/// Why there is no mesh.
+#[derive(Debug, Error)]
+pub enum ReadError {
+    /// The system refused.
+    #[error("cannot read {}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The extension is none of those known.
+    #[error("{} is not a mesh by its name; it must end in .ply, .obj or .stl", path.display())]
+    Extension {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file is larger than is read.
+    #[error("{} has more than {} MB; simplify the mesh first", path.display(), MAX_BYTES >> 20)]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The bytes are not what the extension says, or end too early.
+    #[error("{} is no sound mesh: {what}", path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, and where.
+        what: String,
+    },
+}
+
+/// Reads the mesh in the file `path`, with coordinates as they stand there.
+///
+/// # Errors
+///
+/// See [`ReadError`]; a mesh without vertices or faces is refused too.
+pub fn read(path: &Path) -> Result<Mesh, ReadError> {
+    let extension = path.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase);
+    let parse = match extension.as_deref() {
+        Some("ply") => ply::parse,
+        Some("obj") => obj::parse,
+        Some("stl") => stl::parse,
+        _ => return Err(ReadError::Extension { path: path.to_path_buf() }),
+    };
+    let bytes = bytes_of(path).map_err(|source| ReadError::Io { path: path.to_path_buf(), source })?;
+    if bytes.len() as u64 > MAX_BYTES {
+        return Err(ReadError::TooLarge { path: path.to_path_buf() });
+    }
+    parse(&bytes).and_then(sound).map_err(|what| ReadError::Content { path: path.to_path_buf(), what })
+}
+
+/// The file's bytes, or one more than are allowed.
+fn bytes_of(path: &Path) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    std::fs::File::open(path)?.take(MAX_BYTES + 1).read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+fn sound(mesh: Mesh) -> Result<Mesh, String> {
+    if mesh.faces.is_empty() {
+        return Err("it has no faces".into());
+    }
+    if let Some(vertex) = mesh.vertices.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
+        return Err(format!("a coordinate of vertex {vertex} is not a finite number"));
+    }
+    let count = mesh.vertices.len();
+    match mesh.faces.iter().position(|face| face.iter().any(|&corner| corner as usize >= count)) {
+        Some(face) => Err(format!("triangle {face} names a vertex that is not there")),
+        None => Ok(mesh),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_are_sentences_with_the_path() {
+        let folder = tempfile::tempdir().unwrap();
+        let told = |name: &str, bytes: &[u8]| {
+            let path = folder.path().join(name);
+            std::fs::write(&path, bytes).unwrap();
+            read(&path).unwrap_err().to_string().replace(&folder.path().display().to_string(), "F")
+        };
+        assert_eq!(
+            told("a.glb", b""),
+            "F/a.glb is not a mesh by its name; it must end in .ply, .obj or .stl"
+        );
+        assert_eq!(told("a.OBJ", b"v 1 2 3\n"), "F/a.OBJ is no sound mesh: it has no faces");
+        assert!(told("a.ply", b"").starts_with("F/a.ply is no sound mesh: "));
+        assert!(told("a.stl", b"").starts_with("F/a.stl is no sound mesh: "));
+        assert!(read(&folder.path().join("none.ply")).unwrap_err().to_string().starts_with("cannot read "));
+    }
+
+    #[test]
+    fn coordinates_must_be_finite() {
+        for x in ["nan", "inf", "1e999"] {
+            let text = format!("v {x} 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+            assert!(obj::parse(text.as_bytes()).and_then(sound).is_err(), "{x}");
+        }
+    }
+}

@@ -1,0 +1,364 @@
+//! PLY (G. Turk, "The PLY Polygon File Format", 1994): ascii and binary, either byte order, with any
+//! elements and properties around the `x y z` of `vertex` and the list of `face`, which are all that is
+//! kept.
+
+use std::str::SplitAsciiWhitespace;
+
+use nalgebra::Point3;
+
+use crate::mesh::Mesh;
+
+/// The mesh in the bytes of a PLY file.
+///
+/// # Errors
+///
+/// What is wrong.
+pub(super) fn parse(bytes: &[u8]) -> Result<Mesh, String> {
+    let (header, body) = Header::parse(bytes)?;
+    let mut values = match header.format {
+        Format::Ascii => {
+            let text = str::from_utf8(body).map_err(|_| "its values are not text")?;
+            Values::Ascii(text.split_ascii_whitespace())
+        }
+        Format::LittleEndian => Values::Binary { rest: body, little: true },
+        Format::BigEndian => Values::Binary { rest: body, little: false },
+    };
+    let mut mesh = Mesh::default();
+    for element in &header.elements {
+        element
+            .read(&mut values, &mut mesh)
+            .map_err(|what| format!("in element {}: {what}", element.name))?;
+    }
+    Ok(mesh)
+}
+
+enum Format {
+    Ascii,
+    LittleEndian,
+    BigEndian,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    F32,
+    F64,
+}
+
+impl Kind {
+    fn named(name: Option<&str>) -> Result<Self, String> {
+        Ok(match name {
+            Some("char" | "int8") => Self::I8,
+            Some("uchar" | "uint8") => Self::U8,
+            Some("short" | "int16") => Self::I16,
+            Some("ushort" | "uint16") => Self::U16,
+            Some("int" | "int32") => Self::I32,
+            Some("uint" | "uint32") => Self::U32,
+            Some("float" | "float32") => Self::F32,
+            Some("double" | "float64") => Self::F64,
+            other => return Err(format!("the header has a property of unknown type {other:?}")),
+        })
+    }
+}
+
+struct Property {
+    name: String,
+    kind: Kind,
+    /// Of a list, the type of its length.
+    length: Option<Kind>,
+}
+
+struct Element {
+    name: String,
+    count: u64,
+    properties: Vec<Property>,
+}
+
+struct Header {
+    format: Format,
+    elements: Vec<Element>,
+}
+
+impl Header {
+    /// The header, and the bytes behind it.
+    fn parse(bytes: &[u8]) -> Result<(Self, &[u8]), String> {
+        let mut rest = bytes;
+        if next_line(&mut rest)? != "ply" {
+            return Err("it does not begin with \"ply\"".into());
+        }
+        let mut format = None;
+        let mut elements: Vec<Element> = Vec::new();
+        loop {
+            let line = next_line(&mut rest)?;
+            let mut words = line.split_ascii_whitespace();
+            match words.next() {
+                Some("format") => format = Some(parse_format(words.next())?),
+                Some("element") => elements.push(parse_element(words)?),
+                Some("property") => {
+                    let element = elements.last_mut().ok_or("a property stands before any element")?;
+                    element.properties.push(parse_property(words)?);
+                }
+                Some("end_header") => break,
+                Some("comment" | "obj_info") | None => {}
+                Some(other) => return Err(format!("the header has the unknown line \"{other} ...\"")),
+            }
+        }
+        Ok((Self { format: format.ok_or("the header does not name a format")?, elements }, rest))
+    }
+}
+
+/// Takes a line off the header, without its end.
+fn next_line<'a>(rest: &mut &'a [u8]) -> Result<&'a str, String> {
+    let end = rest.iter().position(|&byte| byte == b'\n').ok_or("the header does not end")?;
+    let line = str::from_utf8(&rest[..end]).map_err(|_| "the header is not text")?;
+    *rest = &rest[end + 1..];
+    Ok(line.trim_end())
+}
+
+fn parse_format(name: Option<&str>) -> Result<Format, String> {
+    match name {
+        Some("ascii") => Ok(Format::Ascii),
+        Some("binary_little_endian") => Ok(Format::LittleEndian),
+        Some("binary_big_endian") => Ok(Format::BigEndian),
+        other => Err(format!("the format {other:?} is unknown")),
+    }
+}
+
+fn parse_element(mut words: SplitAsciiWhitespace) -> Result<Element, String> {
+    let name = words.next().ok_or("an element has no name")?;
+    let count = words.next().and_then(|count| count.parse().ok());
+    let count = count.ok_or_else(|| format!("the number of element {name} is not a number"))?;
+    Ok(Element { name: name.into(), count, properties: Vec::new() })
+}
+
+fn parse_property(mut words: SplitAsciiWhitespace) -> Result<Property, String> {
+    let first = words.next();
+    let (length, kind) = if first == Some("list") {
+        (Some(Kind::named(words.next())?), Kind::named(words.next())?)
+    } else {
+        (None, Kind::named(first)?)
+    };
+    Ok(Property { name: words.next().ok_or("a property has no name")?.into(), kind, length })
+}
+
+impl Element {
+    /// Reads all its instances and keeps vertices and faces. What is kept grows with what has been read,
+    /// not with the count, which may lie.
+    fn read(&self, values: &mut Values, mesh: &mut Mesh) -> Result<(), String> {
+        if self.properties.is_empty() {
+            return Ok(());
+        }
+        match self.name.as_str() {
+            "vertex" => self.read_vertices(values, mesh),
+            "face" => self.read_faces(values, mesh),
+            _ => (0..self.count).try_for_each(|_| {
+                self.properties.iter().try_for_each(|property| property.read(values, |_| {}))
+            }),
+        }
+    }
+
+    fn read_vertices(&self, values: &mut Values, mesh: &mut Mesh) -> Result<(), String> {
+        let place = |name: &str| {
+            let found = self.properties.iter().position(|p| p.name == name && p.length.is_none());
+            found.ok_or_else(|| format!("there is no property {name}"))
+        };
+        let axes = [place("x")?, place("y")?, place("z")?];
+        for _ in 0..self.count {
+            let mut vertex = Point3::origin();
+            for (i, property) in self.properties.iter().enumerate() {
+                let axis = axes.iter().position(|&axis| axis == i);
+                property.read(values, |value| {
+                    if let Some(axis) = axis {
+                        vertex[axis] = value;
+                    }
+                })?;
+            }
+            mesh.vertices.push(vertex);
+        }
+        Ok(())
+    }
+
+    fn read_faces(&self, values: &mut Values, mesh: &mut Mesh) -> Result<(), String> {
+        let is_corners =
+            |p: &Property| p.length.is_some() && ["vertex_indices", "vertex_index"].contains(&&*p.name);
+        let corners_at =
+            self.properties.iter().position(is_corners).ok_or("there is no list vertex_indices")?;
+        let mut corners = Vec::new();
+        for _ in 0..self.count {
+            corners.clear();
+            for (i, property) in self.properties.iter().enumerate() {
+                property.read(values, |value| {
+                    if i == corners_at {
+                        corners.push(value);
+                    }
+                })?;
+            }
+            if corners.iter().any(|&x| x < 0.0 || x > f64::from(u32::MAX) || x.fract() != 0.0) {
+                return Err(format!("a face has the corners {corners:?}"));
+            }
+            if corners.len() < 3 {
+                return Err(format!("a face has {} corners", corners.len()));
+            }
+            let first = corners[0] as u32;
+            mesh.faces.extend(corners[1..].windows(2).map(|pair| [first, pair[0] as u32, pair[1] as u32]));
+        }
+        Ok(())
+    }
+}
+
+impl Property {
+    /// Hands each value to `keep`: one, or those of the list.
+    fn read(&self, values: &mut Values, mut keep: impl FnMut(f64)) -> Result<(), String> {
+        let count = match self.length {
+            None => 1.0,
+            Some(kind) => values.next(kind)?,
+        };
+        if count < 0.0 || count.fract() != 0.0 {
+            return Err(format!("a list has {count} entries"));
+        }
+        for _ in 0..count as u64 {
+            keep(values.next(self.kind)?);
+        }
+        Ok(())
+    }
+}
+
+/// The values behind the header. Every type of PLY is exact in an f64.
+enum Values<'a> {
+    Ascii(SplitAsciiWhitespace<'a>),
+    Binary { rest: &'a [u8], little: bool },
+}
+
+impl Values<'_> {
+    fn next(&mut self, kind: Kind) -> Result<f64, String> {
+        match self {
+            Self::Ascii(words) => {
+                let word = words.next().ok_or("the file ends too early")?;
+                let value: f64 = word.parse().map_err(|_| format!("\"{word}\" is not a number"))?;
+                Ok(value)
+            }
+            Self::Binary { rest, little } => {
+                let little = *little;
+                Ok(match kind {
+                    Kind::I8 => f64::from(i8::from_le_bytes(take(rest, little)?)),
+                    Kind::U8 => f64::from(u8::from_le_bytes(take(rest, little)?)),
+                    Kind::I16 => f64::from(i16::from_le_bytes(take(rest, little)?)),
+                    Kind::U16 => f64::from(u16::from_le_bytes(take(rest, little)?)),
+                    Kind::I32 => f64::from(i32::from_le_bytes(take(rest, little)?)),
+                    Kind::U32 => f64::from(u32::from_le_bytes(take(rest, little)?)),
+                    Kind::F32 => f64::from(f32::from_le_bytes(take(rest, little)?)),
+                    Kind::F64 => f64::from_le_bytes(take(rest, little)?),
+                })
+            }
+        }
+    }
+}
+
+/// Takes the next `N` bytes, turned to little-endian.
+fn take<const N: usize>(rest: &mut &[u8], little: bool) -> Result<[u8; N], String> {
+    let (&value, behind) = rest.split_first_chunk::<N>().ok_or("the file ends too early")?;
+    *rest = behind;
+    let mut bytes: [u8; N] = value;
+    if !little {
+        bytes.reverse();
+    }
+    Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A square with a colour and a list at each vertex, an element of no use, and a face with a flag.
+    const PROPERTIES: &str = "comment none\nelement vertex 4\nproperty double x\nproperty uchar red\n\
+        property list uchar short odd\nproperty float y\nproperty float z\nelement thing 2\nproperty int a\n\
+        element face 1\nproperty char flag\nproperty list uint ushort vertex_index\nend_header\n";
+
+    fn ascii() -> Vec<u8> {
+        let values = "0 9 0 0 5\n1 9 2 -7 7 0 5\n1 9 0 1 5\n0 9 0 1 5\n4\n5\n-1 4 0 1 2 3\n";
+        format!("ply\r\nformat ascii 1.0\n{PROPERTIES}{values}").into_bytes()
+    }
+
+    fn binary(little: bool) -> Vec<u8> {
+        let order = if little { "little" } else { "big" };
+        let mut bytes = format!("ply\nformat binary_{order}_endian 1.0\n{PROPERTIES}").into_bytes();
+        let mut put = |value: &[u8]| {
+            let mut value = value.to_vec();
+            if !little {
+                value.reverse();
+            }
+            bytes.extend(value);
+        };
+        for (x, odd, y) in
+            [(0.0_f64, &[][..], 0.0_f32), (1.0, &[-7_i16, 7], 0.0), (1.0, &[], 1.0), (0.0, &[], 1.0)]
+        {
+            put(&x.to_le_bytes());
+            put(&[9]);
+            put(&[odd.len() as u8]);
+            odd.iter().for_each(|value| put(&value.to_le_bytes()));
+            put(&y.to_le_bytes());
+            put(&5_f32.to_le_bytes());
+        }
+        [4_i32, 5].iter().for_each(|value| put(&value.to_le_bytes()));
+        put(&[0xff]);
+        put(&4_u32.to_le_bytes());
+        [0_u16, 1, 2, 3].iter().for_each(|value| put(&value.to_le_bytes()));
+        bytes
+    }
+
+    #[test]
+    fn the_three_formats_give_the_same_mesh() {
+        let mesh = parse(&ascii()).unwrap();
+        assert_eq!(
+            mesh.vertices,
+            [[0.0, 0.0, 5.0], [1.0, 0.0, 5.0], [1.0, 1.0, 5.0], [0.0, 1.0, 5.0]].map(Point3::from)
+        );
+        assert_eq!(mesh.faces, [[0, 1, 2], [0, 2, 3]]);
+        assert_eq!(parse(&binary(true)).unwrap(), mesh);
+        assert_eq!(parse(&binary(false)).unwrap(), mesh);
+    }
+
+    #[test]
+    fn a_file_cut_anywhere_is_an_error() {
+        for whole in [binary(true), binary(false)] {
+            for length in 0..whole.len() {
+                assert!(parse(&whole[..length]).is_err(), "{length}");
+            }
+        }
+        // Of text, the last digit and the line end may go unnoticed.
+        let whole = ascii();
+        for length in 0..whole.len() - 2 {
+            assert!(parse(&whole[..length]).is_err(), "{length}");
+        }
+    }
+
+    #[test]
+    fn a_bit_turned_anywhere_does_not_panic() {
+        for whole in [ascii(), binary(true), binary(false)] {
+            for place in 0..whole.len() * 8 {
+                let mut bytes = whole.clone();
+                bytes[place / 8] ^= 1 << (place % 8);
+                let _ = parse(&bytes);
+            }
+        }
+    }
+
+    #[test]
+    fn counts_that_lie_neither_allocate_nor_hang() {
+        let with = |elements: &str| {
+            parse(format!("ply\nformat binary_little_endian 1.0\n{elements}end_header\n12345678").as_bytes())
+        };
+        let xyz = "property float x\nproperty float y\nproperty float z\n";
+        let list = "property list uint uchar vertex_indices\n";
+        assert!(with(&format!("element vertex 18446744073709551615\n{xyz}")).is_err());
+        assert!(with(&format!("element face 4294967295\n{list}")).is_err());
+        assert!(with("element nothing 18446744073709551615\n").is_ok());
+        assert!(with("element thing 1\nproperty list double uchar many\n").is_err());
+        assert!(with(&format!("element vertex -1\n{xyz}")).is_err());
+    }
+}
