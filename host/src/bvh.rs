@@ -15,8 +15,8 @@ use crate::mesh::Mesh;
 
 /// Largest number of triangles in a leaf.
 const LEAF: usize = 4;
-/// Nodes that wait during a walk: one a level, and halving 2^32 triangles takes 32 levels.
-const STACK: usize = 64;
+/// Bins along a side among which a box is divided.
+const BINS: usize = 16;
 /// How much later a ray may leave a box than computed, so that rounding loses no triangle.
 const SLACK: f64 = 1.0 + 1e-12;
 
@@ -34,8 +34,7 @@ pub struct Hit {
 /// A box over a part of the triangles. The left child of an inner node is the node after it.
 #[derive(Clone, Copy, Debug)]
 struct Node {
-    low: Point3<f64>,
-    high: Point3<f64>,
+    bounds: Bounds,
     /// First triangle of a leaf, or right child of an inner node.
     first: u32,
     /// Number of triangles of a leaf, 0 for an inner node.
@@ -63,13 +62,16 @@ impl Bvh {
     /// corners that coincide.
     #[must_use]
     pub fn of_triangles(triangles: Vec<[Point3<f64>; 3]>) -> Self {
-        let centroids: Vec<Vector3<f64>> =
-            triangles.iter().map(|t| (t[0].coords + t[1].coords + t[2].coords) / 3.0).collect();
-        let mut faces: Vec<u32> = (0..triangles.len() as u32).collect();
-        let mut nodes = Vec::with_capacity(triangles.len());
-        if !faces.is_empty() {
-            split(&triangles, &centroids, &mut faces, 0, &mut nodes);
+        let item = |(face, corners): (usize, &[Point3<f64>; 3])| {
+            let bounds = Bounds::of(corners);
+            Item { bounds, middle: nalgebra::center(&bounds.low, &bounds.high), face: face as u32 }
+        };
+        let mut items: Vec<Item> = triangles.iter().enumerate().map(item).collect();
+        let mut nodes = Vec::with_capacity(items.len());
+        if !items.is_empty() {
+            build(&mut items, 0, &mut nodes);
         }
+        let faces: Vec<u32> = items.iter().map(|item| item.face).collect();
         let triangles = faces.iter().map(|&face| triangles[face as usize]).collect();
         Self { nodes, triangles, faces }
     }
@@ -79,151 +81,188 @@ impl Bvh {
     pub fn first_hit(&self, origin: &Point3<f64>, direction: &Vector3<f64>) -> Option<Hit> {
         // A component of zero would make 0 * infinity of a box that begins at the origin.
         let inverse = direction.map(|d| 1.0 / if d.abs() < 1e-300 { 1e-300 } else { d });
-        let mut best: Option<Hit> = None;
-        let mut limit = f64::INFINITY;
-        let mut stack = Stack::new(&self.nodes, |node| node.entry(origin, &inverse));
-        while let Some((index, node, entry)) = stack.pop(&self.nodes) {
-            if entry > limit {
-                continue;
-            }
-            if node.count == 0 {
-                let left = (index + 1, self.nodes[index as usize + 1].entry(origin, &inverse));
-                let right = (node.first, self.nodes[node.first as usize].entry(origin, &inverse));
-                stack.push(left, right, limit);
-                continue;
-            }
-            for i in node.first as usize..(node.first + node.count) as usize {
-                if let Some((parameter, weights)) = ray_triangle(origin, direction, &self.triangles[i])
-                    && parameter < limit
-                {
-                    limit = parameter;
-                    best = Some(Hit { face: self.faces[i], parameter, weights });
+        let ray = Ray { origin, direction, inverse };
+        let mut best = Best { hit: None, parameter: f64::INFINITY };
+        if let Some(root) = self.nodes.first()
+            && root.bounds.entry(&ray) < best.parameter
+        {
+            self.cast(0, &ray, &mut best);
+        }
+        best.hit
+    }
+
+    /// Looks for a hit before the best one among the triangles under a node. Calls itself to the depth
+    /// of the tree; a stack of its own would have to be cleared for every ray.
+    fn cast(&self, index: u32, ray: &Ray, best: &mut Best) {
+        let node = &self.nodes[index as usize];
+        if node.count == 0 {
+            let child = |index: u32| (index, self.nodes[index as usize].bounds.entry(ray));
+            for (index, entry) in sorted(child(index + 1), child(node.first)) {
+                if entry < best.parameter {
+                    self.cast(index, ray, best);
                 }
             }
+            return;
         }
-        best
+        for i in node.first as usize..(node.first + node.count) as usize {
+            if let Some((parameter, weights)) = ray_triangle(ray, &self.triangles[i])
+                && parameter < best.parameter
+            {
+                *best = Best { hit: Some(Hit { face: self.faces[i], parameter, weights }), parameter };
+            }
+        }
     }
 
     /// Distance from a point to the nearest triangle, mm; infinite if there is none.
     #[must_use]
     pub fn distance(&self, point: &Point3<f64>) -> f64 {
-        let mut best = f64::INFINITY;
-        let mut stack = Stack::new(&self.nodes, |node| node.distance_squared(point));
-        while let Some((index, node, near)) = stack.pop(&self.nodes) {
-            if near >= best {
-                continue;
-            }
-            if node.count == 0 {
-                let left = (index + 1, self.nodes[index as usize + 1].distance_squared(point));
-                let right = (node.first, self.nodes[node.first as usize].distance_squared(point));
-                stack.push(left, right, best);
-                continue;
-            }
-            for triangle in &self.triangles[node.first as usize..(node.first + node.count) as usize] {
-                best = best.min((point - nearest_on_triangle(point, triangle)).norm_squared());
-            }
+        let mut square = f64::INFINITY;
+        if !self.nodes.is_empty() {
+            self.approach(0, point, &mut square);
         }
-        best.sqrt()
+        square.sqrt()
+    }
+
+    /// Lowers `square`, the least square of a distance so far, to that of the triangles under a node.
+    fn approach(&self, index: u32, point: &Point3<f64>, square: &mut f64) {
+        let node = &self.nodes[index as usize];
+        if node.count == 0 {
+            let child = |index: u32| (index, self.nodes[index as usize].bounds.distance_squared(point));
+            for (index, least) in sorted(child(index + 1), child(node.first)) {
+                if least < *square {
+                    self.approach(index, point, square);
+                }
+            }
+            return;
+        }
+        for triangle in &self.triangles[node.first as usize..(node.first + node.count) as usize] {
+            *square = square.min((point - nearest_on_triangle(point, triangle)).norm_squared());
+        }
     }
 }
 
-/// Builds the subtree over `faces`, which start at `offset` in leaf order: halves them at the median
-/// of their centroids along the longest side.
-fn split(
-    triangles: &[[Point3<f64>; 3]],
-    centroids: &[Vector3<f64>],
-    faces: &mut [u32],
-    offset: u32,
-    nodes: &mut Vec<Node>,
-) {
-    let infinity = Point3::from(Vector3::repeat(f64::INFINITY));
-    let (mut low, mut high) = (infinity, -infinity);
-    let (mut least, mut most) = (infinity.coords, -infinity.coords);
-    for &face in faces.iter() {
-        for corner in &triangles[face as usize] {
-            (low, high) = (low.inf(corner), high.sup(corner));
-        }
-        let centroid = &centroids[face as usize];
-        (least, most) = (least.inf(centroid), most.sup(centroid));
-    }
-    let here = nodes.len();
-    nodes.push(Node { low, high, first: offset, count: faces.len() as u32 });
-    if faces.len() <= LEAF {
-        return;
-    }
-    let axis = (most - least).imax();
-    let half = faces.len() / 2;
-    faces.select_nth_unstable_by(half, |&a, &b| {
-        centroids[a as usize][axis].total_cmp(&centroids[b as usize][axis]).then(a.cmp(&b))
-    });
-    let (left, right) = faces.split_at_mut(half);
-    split(triangles, centroids, left, offset, nodes);
-    nodes[here].first = nodes.len() as u32;
-    nodes[here].count = 0;
-    split(triangles, centroids, right, offset + half as u32, nodes);
+/// A ray and the inverses of its direction's components.
+struct Ray<'a> {
+    origin: &'a Point3<f64>,
+    direction: &'a Vector3<f64>,
+    inverse: Vector3<f64>,
 }
 
-impl Node {
+/// The first hit so far.
+struct Best {
+    hit: Option<Hit>,
+    /// Its parameter; infinite without a hit.
+    parameter: f64,
+}
+
+/// The lower value first.
+fn sorted(a: (u32, f64), b: (u32, f64)) -> [(u32, f64); 2] {
+    if a.1 <= b.1 { [a, b] } else { [b, a] }
+}
+
+/// A box, grown to hold what is added to it.
+#[derive(Clone, Copy, Debug)]
+struct Bounds {
+    low: Point3<f64>,
+    high: Point3<f64>,
+}
+
+impl Bounds {
+    const EMPTY: Self = Self {
+        low: Point3::new(f64::INFINITY, f64::INFINITY, f64::INFINITY),
+        high: Point3::new(f64::NEG_INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY),
+    };
+
+    fn of(points: &[Point3<f64>]) -> Self {
+        points.iter().fold(Self::EMPTY, |bounds, p| bounds.with(&Self { low: *p, high: *p }))
+    }
+
+    fn with(&self, other: &Self) -> Self {
+        Self { low: self.low.inf(&other.low), high: self.high.sup(&other.high) }
+    }
+
     /// Where a ray enters the box, 0 from inside; infinite if it misses.
-    fn entry(&self, origin: &Point3<f64>, inverse: &Vector3<f64>) -> f64 {
-        let a = (self.low - origin).component_mul(inverse);
-        let b = (self.high - origin).component_mul(inverse);
+    fn entry(&self, ray: &Ray) -> f64 {
+        let a = (self.low - ray.origin).component_mul(&ray.inverse);
+        let b = (self.high - ray.origin).component_mul(&ray.inverse);
         let (near, far) = (a.inf(&b), a.sup(&b));
         let enter = near.x.max(near.y).max(near.z).max(0.0);
         let leave = far.x.min(far.y).min(far.z);
         if enter <= leave * SLACK { enter } else { f64::INFINITY }
     }
 
+    /// Square of the distance from a point, 0 from inside.
     fn distance_squared(&self, point: &Point3<f64>) -> f64 {
-        let below = (self.low - point).sup(&Vector3::zeros());
-        let above = (point - self.high).sup(&Vector3::zeros());
-        below.norm_squared() + above.norm_squared()
+        (self.low - point).sup(&(point - self.high)).sup(&Vector3::zeros()).norm_squared()
+    }
+
+    /// Half the area of its surface, which is in proportion to the rays that meet it.
+    fn half_area(&self) -> f64 {
+        let side = (self.high - self.low).sup(&Vector3::zeros());
+        side.x * side.y + side.y * side.z + side.z * side.x
     }
 }
 
-/// Nodes still to visit, each with the least value a triangle under it can have; nearest on top.
-struct Stack {
-    waiting: [(u32, f64); STACK],
-    len: usize,
+/// What the tree is built from: a triangle's box, the middle of it, and its number.
+struct Item {
+    bounds: Bounds,
+    middle: Point3<f64>,
+    face: u32,
 }
 
-impl Stack {
-    fn new(nodes: &[Node], value: impl Fn(&Node) -> f64) -> Self {
-        let mut stack = Self { waiting: [(0, 0.0); STACK], len: 0 };
-        if let Some(root) = nodes.first() {
-            stack.add((0, value(root)), f64::INFINITY);
-        }
-        stack
+/// Builds the subtree over `items`, which start at `offset` in leaf order.
+fn build(items: &mut [Item], offset: u32, nodes: &mut Vec<Node>) {
+    let bounds = items.iter().fold(Bounds::EMPTY, |all, item| all.with(&item.bounds));
+    let here = nodes.len();
+    nodes.push(Node { bounds, first: offset, count: items.len() as u32 });
+    if items.len() <= LEAF {
+        return;
     }
+    let half = divide(items);
+    let (left, right) = items.split_at_mut(half);
+    build(left, offset, nodes);
+    nodes[here].first = nodes.len() as u32;
+    nodes[here].count = 0;
+    build(right, offset + half as u32, nodes);
+}
 
-    fn add(&mut self, node: (u32, f64), limit: f64) {
-        if node.1 < limit {
-            self.waiting[self.len] = node;
-            self.len += 1;
-        }
+/// Puts the items of the left child first and returns their number: of the planes between bins along
+/// the longest side, the one with the least sum of boxes' areas times their items (MacDonald and Booth
+/// 1990); the median if they leave a child nearly empty, so that the tree stays shallow.
+fn divide(items: &mut [Item]) -> usize {
+    let middles = items.iter().fold(Bounds::EMPTY, |all, item| all.with(&Bounds::of(&[item.middle])));
+    let axis = (middles.high - middles.low).imax();
+    let scale = BINS as f64 / (middles.high - middles.low)[axis];
+    let bin = |item: &Item| (((item.middle[axis] - middles.low[axis]) * scale) as usize).min(BINS - 1);
+    let mut bins = [(Bounds::EMPTY, 0usize); BINS];
+    for item in items.iter() {
+        let (bounds, count) = &mut bins[bin(item)];
+        *bounds = bounds.with(&item.bounds);
+        *count += 1;
     }
-
-    fn push(&mut self, a: (u32, f64), b: (u32, f64), limit: f64) {
-        let (near, far) = if a.1 <= b.1 { (a, b) } else { (b, a) };
-        self.add(far, limit);
-        self.add(near, limit);
+    let side = |bins: &[(Bounds, usize)]| {
+        let (bounds, count) = bins.iter().fold((Bounds::EMPTY, 0), |(b, n), bin| (b.with(&bin.0), n + bin.1));
+        (count, bounds.half_area() * count as f64)
+    };
+    let cost = |plane: usize| side(&bins[..plane]).1 + side(&bins[plane..]).1;
+    let plane = (1..BINS).min_by(|&a, &b| cost(a).total_cmp(&cost(b))).unwrap_or(1);
+    let count = side(&bins[..plane]).0;
+    if count.min(items.len() - count) >= items.len() / 8 {
+        items.sort_by_key(|item| bin(item) >= plane);
+        return count;
     }
-
-    fn pop<'a>(&mut self, nodes: &'a [Node]) -> Option<(u32, &'a Node, f64)> {
-        self.len = self.len.checked_sub(1)?;
-        let (index, value) = self.waiting[self.len];
-        Some((index, &nodes[index as usize], value))
-    }
+    let half = items.len() / 2;
+    items.select_nth_unstable_by(half, |a, b| {
+        a.middle[axis].total_cmp(&b.middle[axis]).then(a.face.cmp(&b.face))
+    });
+    half
 }
 
 /// Parameter and weights of a ray's hit on a triangle, from the volumes that the ray spans with its
 /// edges (Pluecker coordinates).
-fn ray_triangle(
-    origin: &Point3<f64>,
-    direction: &Vector3<f64>,
-    triangle: &[Point3<f64>; 3],
-) -> Option<(f64, [f64; 3])> {
-    let [a, b, c] = triangle.map(|corner| corner - origin);
+fn ray_triangle(ray: &Ray, triangle: &[Point3<f64>; 3]) -> Option<(f64, [f64; 3])> {
+    let direction = ray.direction;
+    let [a, b, c] = triangle.map(|corner| corner - ray.origin);
     let volumes = [(&b, &c), (&c, &a), (&a, &b)].map(|(p, q)| (direction.dot(&p.cross(q)), before(p, q)));
     let [u, v, w] = volumes.map(|(volume, tie)| volume > 0.0 || (volume == 0.0 && tie));
     if u != v || v != w {

@@ -36,9 +36,8 @@ impl Silhouette {
     /// Pixels that both cover over pixels that either covers; 0 if neither covers any.
     #[must_use]
     pub fn iou(&self, other: &Self) -> f64 {
-        let count = |test: fn(bool, bool) -> bool| {
-            self.0.iter().zip(&other.0).filter(|&(&a, &b)| test(a, b)).count()
-        };
+        let count =
+            |test: fn(bool, bool) -> bool| self.0.iter().zip(&other.0).filter(|&(&a, &b)| test(a, b)).count();
         count(|a, b| a && b) as f64 / count(|a, b| a || b).max(1) as f64
     }
 }

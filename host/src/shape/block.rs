@@ -19,7 +19,7 @@ pub(super) fn solid() -> Solid {
         field: Box::new(|p| outline_distance(&p.coords.xy()).max(p.z.abs() - HALF_DEPTH)),
         low: Point3::new(-52.0, -36.0, -HALF_DEPTH),
         high: Point3::new(52.0, 36.0, HALF_DEPTH),
-        turn: turn([0.0, 0.0, 1.0], 8.0) * turn([1.0, 0.0, 0.0], 20.0) * turn([0.0, 1.0, 0.0], -30.0),
+        turn: turn([0.0, 0.0, 1.0], 6.0) * turn([1.0, 0.0, 0.0], 22.0) * turn([0.0, 1.0, 0.0], 35.0),
     }
 }
 

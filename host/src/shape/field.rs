@@ -38,51 +38,74 @@ impl Tapered {
 
 /// A bent tube: round cones from each point of a line to the next.
 #[derive(Clone, Debug)]
-pub(super) struct Tube(Vec<Tapered>);
+pub(super) struct Tube {
+    pieces: Vec<Tapered>,
+    low: Point3<f64>,
+    high: Point3<f64>,
+}
 
 impl Tube {
     /// The tube along a line of `[x, y, z, radius]`.
     pub(super) fn new(line: &[[f64; 4]]) -> Self {
-        let point = |q: &[f64; 4]| Point3::new(q[0], q[1], q[2]);
-        Self(
-            line.windows(2)
-                .map(|pair| Tapered {
-                    ends: [point(&pair[0]), point(&pair[1])],
-                    radii: [pair[0][3], pair[1][3]],
-                })
-                .collect(),
-        )
+        let infinity = Vector3::repeat(f64::INFINITY).into();
+        let mut tube = Self { pieces: Vec::new(), low: infinity, high: -infinity };
+        for pair in line.windows(2) {
+            let ends = [&pair[0], &pair[1]].map(|q| Point3::new(q[0], q[1], q[2]));
+            let radii = [pair[0][3], pair[1][3]];
+            for (end, radius) in ends.iter().zip(radii) {
+                tube.low = tube.low.inf(&(end - Vector3::repeat(radius)));
+                tube.high = tube.high.sup(&(end + Vector3::repeat(radius)));
+            }
+            tube.pieces.push(Tapered { ends, radii });
+        }
+        tube
     }
 
     /// Distance.
     pub(super) fn at(&self, p: &Point3<f64>) -> f64 {
-        self.0.iter().map(|piece| piece.at(p)).fold(f64::INFINITY, f64::min)
+        self.pieces.iter().map(|piece| piece.at(p)).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Distance to the box around it: never more than to the tube itself.
+    pub(super) fn at_least(&self, p: &Point3<f64>) -> f64 {
+        (self.low - p).sup(&(p - self.high)).sup(&Vector3::zeros()).norm()
     }
 }
 
 /// A solid of revolution.
 #[derive(Clone, Debug)]
-pub(super) struct Revolution(Vec<[f64; 2]>);
+pub(super) struct Revolution(Vec<Side>);
+
+/// A straight piece of the outline in height and radius.
+#[derive(Clone, Copy, Debug)]
+struct Side {
+    from: Vector2<f64>,
+    along: Vector2<f64>,
+    inverse_square: f64,
+}
 
 impl Revolution {
     /// The solid whose outline in the half plane is a line of `[height, radius]`, upwards from the
     /// axis to the axis.
-    pub(super) fn new(line: Vec<[f64; 2]>) -> Self {
-        Self(line)
+    pub(super) fn new(line: &[[f64; 2]]) -> Self {
+        let side = |pair: &[[f64; 2]]| {
+            let (from, along) = (Vector2::from(pair[0]), Vector2::from(pair[1]) - Vector2::from(pair[0]));
+            Side { from, along, inverse_square: 1.0 / along.norm_squared() }
+        };
+        Self(line.windows(2).map(side).collect())
     }
 
     /// Distance at a height along the axis and a radius from it.
     pub(super) fn at(&self, height: f64, radius: f64) -> f64 {
         let mut nearest = f64::INFINITY;
         let mut inside = false;
-        for pair in self.0.windows(2) {
-            let (from, to) = (Vector2::from(pair[0]), Vector2::from(pair[1]));
-            let (side, offset) = (to - from, Vector2::new(height, radius) - from);
-            let t = (offset.dot(&side) / side.norm_squared().max(1e-300)).clamp(0.0, 1.0);
-            nearest = nearest.min((offset - t * side).norm_squared());
+        for Side { from, along, inverse_square } in &self.0 {
+            let offset = Vector2::new(height, radius) - from;
+            let t = (offset.dot(along) * inverse_square).clamp(0.0, 1.0);
+            nearest = nearest.min((offset - t * along).norm_squared());
             // A ray away from the axis leaves the solid where it crosses the outline.
-            let spans = (from.x > height) != (to.x > height);
-            inside ^= spans && from.y + side.y * (offset.x / side.x) > radius;
+            let spans = (offset.x < 0.0) != (offset.x < along.x);
+            inside ^= spans && from.y + along.y * (offset.x / along.x) > radius;
         }
         if inside { -nearest.sqrt() } else { nearest.sqrt() }
     }
@@ -117,7 +140,8 @@ pub(super) fn smooth_line<const N: usize>(points: &[[f64; N]], pieces: usize) ->
         for piece in 0..pieces {
             let t = piece as f64 / pieces as f64;
             line.push(std::array::from_fn(|i| {
-                let curve = 2.0 * p[i] - 5.0 * q[i] + 4.0 * r[i] - s[i] + t * (3.0 * (q[i] - r[i]) + s[i] - p[i]);
+                let curve =
+                    2.0 * p[i] - 5.0 * q[i] + 4.0 * r[i] - s[i] + t * (3.0 * (q[i] - r[i]) + s[i] - p[i]);
                 q[i] + 0.5 * t * (r[i] - p[i] + t * curve)
             }));
         }

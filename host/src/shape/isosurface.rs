@@ -22,6 +22,8 @@ const MOST_CELLS: f64 = 2048.0;
 /// Vertices keep this part of their edge off the grid's nodes, so that no face is degenerate where
 /// the surface passes through a node.
 const OFF_NODE: f64 = 1e-3;
+/// Distance from the surface at which a vertex is on it, mm.
+const EXACT: f64 = 1e-7;
 /// Corners of a cell in the order in which each tetrahedron meets them: bits 0, 1 and 2 of a corner
 /// are its steps along x, y and z. The odd permutations of the axes are in the second half.
 const TETRAHEDRA: [[usize; 4]; 6] =
@@ -32,7 +34,7 @@ type Edge = u64;
 
 /// The zero level of `field` inside the box `bounds`, in cells of `cell` mm (raised, if need be, to
 /// 1/2048 of the box's longest side).
-pub fn isosurface(
+pub(super) fn isosurface(
     field: &(impl Fn(&Point3<f64>) -> f64 + Sync + ?Sized),
     bounds: [Point3<f64>; 2],
     cell: f64,
@@ -107,8 +109,15 @@ impl Grid {
         let mut inside = [[[false; NODES]; NODES]; NODES];
         for (k, plane) in inside.iter_mut().enumerate() {
             for (j, row) in plane.iter_mut().enumerate() {
+                // The sign cannot change nearer than the value, so the nodes up to there need no call.
+                let (mut negative, mut safe) = (false, -1.0);
                 for (i, node) in row.iter_mut().enumerate() {
-                    *node = field(&self.position([base[0] + i, base[1] + j, base[2] + k])) < 0.0;
+                    if i as f64 * self.cell >= safe {
+                        let value = field(&self.position([base[0] + i, base[1] + j, base[2] + k]));
+                        negative = value < 0.0;
+                        safe = i as f64 * self.cell + 0.999 * value.abs();
+                    }
+                    *node = negative;
                 }
             }
         }
@@ -142,7 +151,7 @@ impl Grid {
         for _ in 0..40 {
             t = if fa == fb { 0.5 * (a + b) } else { (a * fb - b * fa) / (fb - fa) };
             let ft = field(&along(t));
-            if ft.abs() < 1e-9 || b - a < 1e-12 {
+            if ft.abs() < EXACT || b - a < 1e-12 {
                 break;
             }
             if (ft < 0.0) == (fa < 0.0) {
@@ -164,12 +173,7 @@ fn step([i, j, k]: [usize; 3], steps: usize) -> [usize; 3] {
 
 /// Gives the faces of one tetrahedron to `emit`, each corner as the edge between two corners of the
 /// cell. `odd` says that the corners run the left-handed way round.
-fn cut(
-    mut corners: [usize; 4],
-    odd: bool,
-    inside: &[bool; 8],
-    mut emit: impl FnMut([(usize, usize); 3]),
-) {
+fn cut(mut corners: [usize; 4], odd: bool, inside: &[bool; 8], mut emit: impl FnMut([(usize, usize); 3])) {
     let count = corners.iter().filter(|&&c| inside[c]).count();
     // Corners inside first. An insertion sort, as its exchanges tell the handedness.
     let mut flipped = odd;

@@ -38,7 +38,7 @@ pub enum Shape {
     Block,
     /// A teapot, 165 mm from handle to spout.
     Teapot,
-    /// A computer mouse, 124 mm long.
+    /// A computer mouse, 155 mm long.
     Mouse,
 }
 
@@ -75,9 +75,10 @@ impl Shape {
     pub const fn cell(self) -> f64 {
         match self {
             Self::Screwdriver => 1.25,
-            Self::Teapot => 1.75,
-            Self::Torus | Self::TorusTilt => 2.0,
-            Self::Sphere | Self::Capsule | Self::Block | Self::Mouse => 2.5,
+            Self::Teapot => 2.0,
+            Self::Torus | Self::TorusTilt => 2.25,
+            Self::Capsule | Self::Block | Self::Mouse => 2.5,
+            Self::Sphere => 3.0,
         }
     }
 
