@@ -2,10 +2,13 @@
 //! says what its pixels mean, the core of `shared` describes and matches it, the stages here grow the
 //! solid, and exports and reports write it down.
 
+pub mod bvh;
 pub mod calibration;
 pub mod evaluate;
 pub mod export;
 pub mod mesh;
+pub mod random;
 pub mod render;
 pub mod shape;
 pub mod stage;
+pub mod view;
