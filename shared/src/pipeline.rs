@@ -159,7 +159,7 @@ impl From<CapacityError> for Finding {
 /// Fewest pixels of an object.
 const MIN_AREA: u32 = 64;
 /// An object that covers more of the image than this is the background, percent.
-const MAX_COVER: u32 = 60;
+pub const MAX_COVER: u32 = 60;
 /// A second component this large gets a warning, percent of the first.
 const SECOND_COVER: u32 = 10;
 /// Least height of an object, px.

@@ -87,7 +87,12 @@ pub fn edges(points: &[ContourPoint], matches: &[ContourMatch]) -> Vec<Edge> {
 }
 
 /// The medial balls in pixels, with the rays to their centres.
-pub fn balls(camera: &RectifiedCamera, edges: &[Edge], medial: &[MedialBall], depths: &[BallDepth]) -> Vec<Ball> {
+pub fn balls(
+    camera: &RectifiedCamera,
+    edges: &[Edge],
+    medial: &[MedialBall],
+    depths: &[BallDepth],
+) -> Vec<Ball> {
     let ball = |(m, d): (&MedialBall, &BallDepth)| {
         let contacts = m.contacts.map(|k| k as usize);
         let (at, rho) = (px2(m.centre), px(m.rho));

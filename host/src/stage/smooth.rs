@@ -80,7 +80,13 @@ fn estimate(balls: &[Ball], excess: &[f64], grid: &Grid, i: usize) -> f64 {
             let offset = (balls[j].at - here.at) / width;
             let q = offset.norm_squared() + ((balls[j].rho - here.rho) / radius_width).powi(2);
             let near = offset.norm_squared() <= 4.0;
-            near.then(|| (Vector3::new(1.0, offset.x, offset.y), excess[j], libm::exp(-0.5 * q) * balls[j].weight.max(0.0025)))
+            near.then(|| {
+                (
+                    Vector3::new(1.0, offset.x, offset.y),
+                    excess[j],
+                    libm::exp(-0.5 * q) * balls[j].weight.max(0.0025),
+                )
+            })
         })
         .collect();
     let total: f64 = neighbours.iter().map(|n| n.2).sum();

@@ -1,0 +1,3 @@
+//! What a run says: numbers, words, pictures.
+
+pub mod words;

@@ -1,0 +1,50 @@
+//! The solid: which balls are joined to round cones.
+//!
+//! The union of balls of the paper's section 4.2 has dents between neighbouring centres. The medial axis
+//! runs on between them, so the convex hull of two neighbouring balls, a round cone, belongs to the
+//! object as well. Neighbours are balls grown from neighbouring contour points whose centres lie close in
+//! the image and in depth: where the axis branches or jumps there is no cone.
+
+use super::surface::RoundCone;
+use nalgebra::{Point3, Vector2};
+use shared::stage::contour::ContourLoop;
+
+/// A ball in space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SolidBall {
+    /// Centre, mm.
+    pub centre: Point3<f64>,
+    /// Radius, mm.
+    pub radius: f64,
+    /// Centre of its image in the left view, px.
+    pub at: Vector2<f64>,
+    /// The contour point that it was grown from.
+    pub grown_from: usize,
+}
+
+/// Centres farther apart in the image are no neighbours, px.
+const NEAR_PX: f64 = 3.0;
+/// Contour points between neighbours at most: some points have no ball.
+const NEAR_POINTS: usize = 3;
+
+/// The round cones of a set of balls, in the order of the contour points that they grew from.
+pub fn solid(balls: &[SolidBall], loops: &[ContourLoop]) -> Vec<RoundCone> {
+    let mut cones = Vec::with_capacity(balls.len());
+    for l in loops {
+        let from = balls.partition_point(|b| b.grown_from < l.start);
+        let to = balls.partition_point(|b| b.grown_from < l.start + l.len);
+        let ring = &balls[from..to];
+        for (k, ball) in ring.iter().enumerate() {
+            let next = &ring[(k + 1) % ring.len()];
+            let ahead = (next.grown_from + l.len - ball.grown_from) % l.len;
+            let end = if ahead <= NEAR_POINTS && joined(ball, next) { next } else { ball };
+            cones.push(RoundCone { centres: [ball.centre, end.centre], radii: [ball.radius, end.radius] });
+        }
+    }
+    cones
+}
+
+/// Whether the axis runs on from one ball to the other.
+fn joined(a: &SolidBall, b: &SolidBall) -> bool {
+    (a.at - b.at).norm() <= NEAR_PX && (a.centre - b.centre).norm() <= a.radius.max(b.radius)
+}
