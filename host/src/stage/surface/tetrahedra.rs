@@ -237,9 +237,9 @@ impl Nearby {
         let near = |&index: &u32| {
             let distance = distances[index as usize];
             let from_middle = distance.at(&block.middle) - lattice.cube * SLACK;
-            match distance.outward(&block.middle) {
+            match distance.outward(&block.middle, lattice.cube) {
                 Some(growth) => Near { from_middle, growth, index, distance },
-                // Of a cone around the middle nothing better is known than the way walked.
+                // Of a cone whose axis passes the middle only the way walked is known.
                 None => Near {
                     from_middle: from_middle - lattice.reach(1),
                     growth: Vector3::zeros(),
@@ -282,7 +282,7 @@ impl Nearby {
         if distance.abs() >= clear {
             return unmoved;
         }
-        let Some(outward) = self.cones[cone].distance.outward(&position) else {
+        let Some(outward) = self.cones[cone].distance.outward(&position, 0.0) else {
             return unmoved;
         };
         // Away from the surface; but from a crease outward there is no getting away, only inward.
@@ -319,5 +319,98 @@ impl Nearby {
             }
         }
         at(share.clamp(END, 1.0 - END))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stage::surface::RoundCone;
+
+    fn volume([a, b, c, d]: [Point3<f64>; 4]) -> f64 {
+        (b - a).cross(&(c - a)).dot(&(d - a)) / 6.0
+    }
+
+    fn all_tetrahedra(point: [i32; 3]) -> impl Iterator<Item = [[i32; 3]; 4]> {
+        (0..3).flat_map(move |axis| [-1, 1].map(|side| tetrahedron(point, axis, side)))
+    }
+
+    /// Thirty cones in 20 mm, thick and thin, some along the axes.
+    fn cones() -> Vec<RoundCone> {
+        let at = |i: i32| Point3::new(f64::from(i * 7 % 20), f64::from(i * 11 % 19), f64::from(i * 5 % 17));
+        let cone = |i: i32| {
+            let end = if i % 3 == 0 { at(i) + Vector3::y() * 4.0 } else { at(i + 1) };
+            RoundCone { centres: [at(i), end], radii: [0.4 + f64::from(i % 4), 1.5] }
+        };
+        (0..30).map(cone).collect()
+    }
+
+    #[test]
+    fn the_tetrahedra_of_a_cube_are_all_right_way_out_and_fill_it() {
+        let volumes: Vec<f64> = all_tetrahedra([4, 6, 8])
+            .chain(all_tetrahedra([5, 7, 9]))
+            .map(|corners| volume(corners.map(|corner| Point3::from(corner.map(f64::from)))))
+            .collect();
+        assert!(volumes.iter().all(|&volume| volume > 0.0));
+        assert!((volumes.iter().sum::<f64>() - 8.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_orders_of_corners_are_even_and_begin_with_the_fewer() {
+        for (set, order) in FEWER_FIRST.iter().enumerate() {
+            let swaps =
+                (0..4).flat_map(|j| (0..j).map(move |i| (i, j))).filter(|&(i, j)| order[i] > order[j]);
+            assert_eq!(swaps.count() % 2, 0, "{order:?}");
+            let inside = order.map(|corner| set >> corner & 1 == 1);
+            match set.count_ones() {
+                1 => assert_eq!(inside, [true, false, false, false]),
+                2 => assert_eq!(inside, [true, true, false, false]),
+                3 => assert_eq!(inside, [false, true, true, true]),
+                _ => {}
+            }
+        }
+    }
+
+    #[test]
+    fn moved_points_turn_no_tetrahedron_inside_out() {
+        let cones = cones();
+        let distances: Vec<Distance> = cones.iter().map(Distance::to).collect();
+        let lattice = Lattice::around(&cones, 1.0);
+        let mut moved = 0;
+        for block in lattice.blocks_near_surface(&distances).unwrap() {
+            let cutter = Cutter::new(&lattice, &block, &distances);
+            for x in 0..2 * SIDE {
+                for (y, z) in
+                    (x % 2..2 * SIDE).step_by(2).flat_map(|y| (x % 2..2 * SIDE).map(move |z| (y, z)))
+                {
+                    if (x - z) % 2 != 0 {
+                        continue;
+                    }
+                    let unmoved = lattice.position(offset(block.corner, [x, y, z]));
+                    moved += usize::from(cutter.sites[slot([x, y, z])].position != unmoved);
+                    for corners in all_tetrahedra([x, y, z]) {
+                        assert!(volume(corners.map(|corner| cutter.sites[slot(corner)].position)) > 1e-3);
+                    }
+                }
+            }
+        }
+        assert!(moved > 100, "{moved}");
+    }
+
+    #[test]
+    fn the_nearest_of_few_is_the_nearest_of_all() {
+        let cones = cones();
+        let distances: Vec<Distance> = cones.iter().map(Distance::to).collect();
+        let lattice = Lattice::around(&cones, 0.7);
+        for block in lattice.blocks_near_surface(&distances).unwrap() {
+            let nearby = Nearby::new(&lattice, &block, &distances);
+            for (x, y, z) in [(-1, -1, -1), (0, 4, 2), (3, 7, 1), (9, 9, 9), (5, -1, 9)] {
+                let p = lattice.position(offset(block.corner, [x, y, z]));
+                let least = distances.iter().map(|distance| distance.at(&p)).fold(f64::INFINITY, f64::min);
+                let first = distances.iter().position(|distance| distance.at(&p) == least).unwrap();
+                let (got, place) = nearby.nearest(&p, nearby.cones.len() - 1);
+                assert_eq!((got, nearby.cones[place].index), (least, first as u32));
+            }
+        }
     }
 }
