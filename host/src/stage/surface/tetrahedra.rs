@@ -10,11 +10,12 @@
 //! What two blocks share they find with the same bits: signs and vertices depend on the nearest cones
 //! alone, and neither block lacks one of those.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 
 use super::{
     block::{Block, Lattice, MAX_SHIFT, SIDE, SLACK},
     distance::Distance,
+    nearby::Nearby,
 };
 
 /// A block's share of the surface.
@@ -214,67 +215,7 @@ fn slot([x, y, z]: [i32; 3]) -> usize {
     (((x + 1) * STRIDE + y + 1) * STRIDE + z + 1) as usize
 }
 
-/// The union of the cones near a block.
-struct Nearby {
-    middle: Point3<f64>,
-    /// By distance from the middle.
-    cones: Vec<Near>,
-}
-
-struct Near {
-    /// Signed distance of the block's middle, mm, less an allowance for rounding.
-    from_middle: f64,
-    /// How that grows from the middle, per mm. A round cone is convex, and so is the distance to it:
-    /// going on straight from the middle gives a distance that is nowhere too large.
-    growth: Vector3<f64>,
-    /// Place in the list of all cones.
-    index: u32,
-    distance: Distance,
-}
-
 impl Nearby {
-    fn new(lattice: &Lattice, block: &Block, distances: &[Distance]) -> Self {
-        let near = |&index: &u32| {
-            let distance = distances[index as usize];
-            let from_middle = distance.at(&block.middle) - lattice.cube * SLACK;
-            match distance.outward(&block.middle, lattice.cube) {
-                Some(growth) => Near { from_middle, growth, index, distance },
-                // Of a cone whose axis passes the middle only the way walked is known.
-                None => Near {
-                    from_middle: from_middle - lattice.reach(1),
-                    growth: Vector3::zeros(),
-                    index,
-                    distance,
-                },
-            }
-        };
-        let mut cones: Vec<Near> = block.cones.iter().map(near).collect();
-        cones.sort_by(|a, b| a.from_middle.total_cmp(&b.from_middle));
-        Self { middle: block.middle, cones }
-    }
-
-    /// Signed distance of `p` and the place here of the cone that decides it: of equals, the first in the
-    /// list of all. A good `guess` at that place saves time and changes nothing else.
-    fn nearest(&self, p: &Point3<f64>, guess: usize) -> (f64, usize) {
-        let walk = p - self.middle;
-        let walked = walk.norm();
-        let mut place = guess;
-        let mut least = self.cones[guess].distance.at(p);
-        for (other, near) in self.cones.iter().enumerate() {
-            if near.from_middle - walked > least {
-                break;
-            }
-            if near.from_middle + near.growth.dot(&walk) > least {
-                continue;
-            }
-            let distance = near.distance.at(p);
-            if (distance, near.index) < (least, self.cones[place].index) {
-                (least, place) = (distance, other);
-            }
-        }
-        (least, place)
-    }
-
     /// The lattice point at `position`, moved until it is `clear` mm off the surface.
     fn site(&self, position: Point3<f64>, guess: usize, clear: f64) -> Site {
         let (distance, cone) = self.nearest(&position, guess);
@@ -325,7 +266,7 @@ impl Nearby {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stage::surface::RoundCone;
+    use crate::stage::surface::nearby::tests::cones;
 
     fn volume([a, b, c, d]: [Point3<f64>; 4]) -> f64 {
         (b - a).cross(&(c - a)).dot(&(d - a)) / 6.0
@@ -333,16 +274,6 @@ mod tests {
 
     fn all_tetrahedra(point: [i32; 3]) -> impl Iterator<Item = [[i32; 3]; 4]> {
         (0..3).flat_map(move |axis| [-1, 1].map(|side| tetrahedron(point, axis, side)))
-    }
-
-    /// Thirty cones in 20 mm, thick and thin, some along the axes.
-    fn cones() -> Vec<RoundCone> {
-        let at = |i: i32| Point3::new(f64::from(i * 7 % 20), f64::from(i * 11 % 19), f64::from(i * 5 % 17));
-        let cone = |i: i32| {
-            let end = if i % 3 == 0 { at(i) + Vector3::y() * 4.0 } else { at(i + 1) };
-            RoundCone { centres: [at(i), end], radii: [0.4 + f64::from(i % 4), 1.5] }
-        };
-        (0..30).map(cone).collect()
     }
 
     #[test]
@@ -395,22 +326,5 @@ mod tests {
             }
         }
         assert!(moved > 100, "{moved}");
-    }
-
-    #[test]
-    fn the_nearest_of_few_is_the_nearest_of_all() {
-        let cones = cones();
-        let distances: Vec<Distance> = cones.iter().map(Distance::to).collect();
-        let lattice = Lattice::around(&cones, 0.7);
-        for block in lattice.blocks_near_surface(&distances).unwrap() {
-            let nearby = Nearby::new(&lattice, &block, &distances);
-            for (x, y, z) in [(-1, -1, -1), (0, 4, 2), (3, 7, 1), (9, 9, 9), (5, -1, 9)] {
-                let p = lattice.position(offset(block.corner, [x, y, z]));
-                let least = distances.iter().map(|distance| distance.at(&p)).fold(f64::INFINITY, f64::min);
-                let first = distances.iter().position(|distance| distance.at(&p) == least).unwrap();
-                let (got, place) = nearby.nearest(&p, nearby.cones.len() - 1);
-                assert_eq!((got, nearby.cones[place].index), (least, first as u32));
-            }
-        }
     }
 }
