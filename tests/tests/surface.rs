@@ -205,7 +205,7 @@ fn figure() -> Vec<RoundCone> {
 }
 
 #[test]
-#[ignore = "a timing: cargo test --release -p system-tests --test surface -- --ignored --nocapture"]
+#[ignore = "a timing, for an idle machine: cargo test --release -p system-tests --test surface -- --ignored --nocapture"]
 fn two_thousand_cones_take_less_than_a_second() {
     let cones = figure();
     let diagonal = {
