@@ -6,11 +6,11 @@
 //! area, and no two faces cross.
 //!
 //! The union is an implicit function, the least of the exact signed distances to the cones
-//! (`distance.rs`). It is looked at only where the surface can pass (`block.rs`), on a body-centred cubic
-//! lattice whose tetrahedra are cut where the function changes its sign (`tetrahedra.rs`), and the pieces
-//! are joined (`stitch.rs`). Tetrahedra, because a plane cuts one in a triangle or a quadrilateral and
-//! nothing else: there is no ambiguous case, so the promise holds by construction instead of by repair
-//! (`docs/decisions/0003-isosurface.md`).
+//! (`distance.rs`, `nearby.rs`). It is looked at only where the surface can pass (`block.rs`), on a
+//! body-centred cubic lattice whose tetrahedra are cut where the function changes its sign
+//! (`tetrahedra.rs`), and the pieces are joined (`stitch.rs`). Tetrahedra, because a plane cuts one in a
+//! triangle or a quadrilateral and nothing else: there is no ambiguous case, so the promise holds by
+//! construction instead of by repair (`docs/decisions/0003-isosurface.md`).
 //!
 //! Cost: proportional to surface / cell². The result has the same bits for any number of threads.
 //! Not promised: features thinner than the cell may be missing, and concave creases are rounded by up to
@@ -18,6 +18,7 @@
 
 mod block;
 mod distance;
+mod nearby;
 mod stitch;
 mod tetrahedra;
 

@@ -20,11 +20,12 @@ const MAX_BLOCKS: usize = 1 << 16;
 /// ([`Lattice::name`]), which is 2^18 cubes, less the margin.
 const MAX_BLOCKS_ALONG: i32 = 1 << 15;
 
-/// How far off the origin the solid may be, in cubes: there a coordinate still resolves 1e-7 of a cube.
-const MAX_OFFSET: f64 = (1u32 << 28) as f64;
+/// How far off the origin the solid may be, in cubes: there a coordinate still resolves 2e-10 cubes.
+const MAX_OFFSET: f64 = (1u32 << 20) as f64;
 
-/// Rounding of distances, in cubes, generously: [`MAX_OFFSET`] bounds it.
-pub(super) const SLACK: f64 = 1e-6;
+/// Rounding, in cubes, of distances and of what their slopes add up to over a block: a coordinate's, times
+/// the largest lean of a cone, times the reach of a block in cubes.
+pub(super) const SLACK: f64 = 1e-5;
 
 /// How far a lattice point may be moved, in cubes. A tetrahedron is half a cube wide at its narrowest, so
 /// below a quarter none can turn inside out.

@@ -9,9 +9,9 @@ use nalgebra::{Point3, Vector3};
 
 use super::RoundCone;
 
-/// A side that leans so much that one ball contains the other but for this share of the length is taken
-/// as one ball: the lean below stays finite, and the hull loses less than rounding does.
-const CONTAINED: f64 = 1.0 - 1e-12;
+/// Where the radius grows by more than this share of the length, the larger ball is taken alone: the hull
+/// loses less than 1e-8 of the length, and the lean below stays under 10^4, which bounds its rounding.
+const CONTAINED: f64 = 1.0 - 1e-8;
 
 /// A round cone made ready for many distance queries.
 #[derive(Clone, Copy, Debug)]
@@ -51,10 +51,11 @@ impl Distance {
         ((along - s) * (along - s) + away * away).sqrt() - (self.radius + self.slope * s)
     }
 
-    /// The unit vector along which the distance grows fastest at `p`; none in the middle of a ball.
-    pub(super) fn outward(&self, p: &Point3<f64>) -> Option<Vector3<f64>> {
+    /// The unit vector along which the distance grows fastest at `p`; none within `blur` mm of the middle
+    /// of the ball that decides, where rounding blurs the direction.
+    pub(super) fn outward(&self, p: &Point3<f64>, blur: f64) -> Option<Vector3<f64>> {
         let (_, _, s) = self.nearest_ball(p);
-        (p - (self.start + self.axis * s)).try_normalize(f64::MIN_POSITIVE)
+        (p - (self.start + self.axis * s)).try_normalize(blur)
     }
 
     /// Where `p` is along the axis and away from it, and the ball that decides its distance, all in mm.
@@ -96,8 +97,8 @@ mod tests {
             [(cone(1.0, [5.0, 2.0]), 0.0), (cone(1.0, [2.0, 5.0]), 1.0), (cone(3.0, [5.0, 2.0]), 0.0)]
         {
             assert_eq!(swallowed.at(&Point3::new(centre, 0.0, 7.0)), 2.0);
-            assert_eq!(swallowed.outward(&Point3::new(centre, 0.0, 7.0)), Some(Vector3::z()));
-            assert_eq!(swallowed.outward(&Point3::new(centre, 0.0, 0.0)), None);
+            assert_eq!(swallowed.outward(&Point3::new(centre, 0.0, 7.0), 0.0), Some(Vector3::z()));
+            assert_eq!(swallowed.outward(&Point3::new(centre, 0.0, 0.0), 0.0), None);
         }
     }
 }

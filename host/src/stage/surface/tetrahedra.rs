@@ -10,11 +10,12 @@
 //! What two blocks share they find with the same bits: signs and vertices depend on the nearest cones
 //! alone, and neither block lacks one of those.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 
 use super::{
     block::{Block, Lattice, MAX_SHIFT, SIDE, SLACK},
     distance::Distance,
+    nearby::Nearby,
 };
 
 /// A block's share of the surface.
@@ -214,67 +215,7 @@ fn slot([x, y, z]: [i32; 3]) -> usize {
     (((x + 1) * STRIDE + y + 1) * STRIDE + z + 1) as usize
 }
 
-/// The union of the cones near a block.
-struct Nearby {
-    middle: Point3<f64>,
-    /// By distance from the middle.
-    cones: Vec<Near>,
-}
-
-struct Near {
-    /// Signed distance of the block's middle, mm, less an allowance for rounding.
-    from_middle: f64,
-    /// How that grows from the middle, per mm. A round cone is convex, and so is the distance to it:
-    /// going on straight from the middle gives a distance that is nowhere too large.
-    growth: Vector3<f64>,
-    /// Place in the list of all cones.
-    index: u32,
-    distance: Distance,
-}
-
 impl Nearby {
-    fn new(lattice: &Lattice, block: &Block, distances: &[Distance]) -> Self {
-        let near = |&index: &u32| {
-            let distance = distances[index as usize];
-            let from_middle = distance.at(&block.middle) - lattice.cube * SLACK;
-            match distance.outward(&block.middle) {
-                Some(growth) => Near { from_middle, growth, index, distance },
-                // Of a cone around the middle nothing better is known than the way walked.
-                None => Near {
-                    from_middle: from_middle - lattice.reach(1),
-                    growth: Vector3::zeros(),
-                    index,
-                    distance,
-                },
-            }
-        };
-        let mut cones: Vec<Near> = block.cones.iter().map(near).collect();
-        cones.sort_by(|a, b| a.from_middle.total_cmp(&b.from_middle));
-        Self { middle: block.middle, cones }
-    }
-
-    /// Signed distance of `p` and the place here of the cone that decides it: of equals, the first in the
-    /// list of all. A good `guess` at that place saves time and changes nothing else.
-    fn nearest(&self, p: &Point3<f64>, guess: usize) -> (f64, usize) {
-        let walk = p - self.middle;
-        let walked = walk.norm();
-        let mut place = guess;
-        let mut least = self.cones[guess].distance.at(p);
-        for (other, near) in self.cones.iter().enumerate() {
-            if near.from_middle - walked > least {
-                break;
-            }
-            if near.from_middle + near.growth.dot(&walk) > least {
-                continue;
-            }
-            let distance = near.distance.at(p);
-            if (distance, near.index) < (least, self.cones[place].index) {
-                (least, place) = (distance, other);
-            }
-        }
-        (least, place)
-    }
-
     /// The lattice point at `position`, moved until it is `clear` mm off the surface.
     fn site(&self, position: Point3<f64>, guess: usize, clear: f64) -> Site {
         let (distance, cone) = self.nearest(&position, guess);
@@ -282,7 +223,7 @@ impl Nearby {
         if distance.abs() >= clear {
             return unmoved;
         }
-        let Some(outward) = self.cones[cone].distance.outward(&position) else {
+        let Some(outward) = self.cones[cone].distance.outward(&position, 0.0) else {
             return unmoved;
         };
         // Away from the surface; but from a crease outward there is no getting away, only inward.
@@ -319,5 +260,71 @@ impl Nearby {
             }
         }
         at(share.clamp(END, 1.0 - END))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stage::surface::nearby::tests::cones;
+
+    fn volume([a, b, c, d]: [Point3<f64>; 4]) -> f64 {
+        (b - a).cross(&(c - a)).dot(&(d - a)) / 6.0
+    }
+
+    fn all_tetrahedra(point: [i32; 3]) -> impl Iterator<Item = [[i32; 3]; 4]> {
+        (0..3).flat_map(move |axis| [-1, 1].map(|side| tetrahedron(point, axis, side)))
+    }
+
+    #[test]
+    fn the_tetrahedra_of_a_cube_are_all_right_way_out_and_fill_it() {
+        let volumes: Vec<f64> = all_tetrahedra([4, 6, 8])
+            .chain(all_tetrahedra([5, 7, 9]))
+            .map(|corners| volume(corners.map(|corner| Point3::from(corner.map(f64::from)))))
+            .collect();
+        assert!(volumes.iter().all(|&volume| volume > 0.0));
+        assert!((volumes.iter().sum::<f64>() - 8.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_orders_of_corners_are_even_and_begin_with_the_fewer() {
+        for (set, order) in FEWER_FIRST.iter().enumerate() {
+            let swaps =
+                (0..4).flat_map(|j| (0..j).map(move |i| (i, j))).filter(|&(i, j)| order[i] > order[j]);
+            assert_eq!(swaps.count() % 2, 0, "{order:?}");
+            let inside = order.map(|corner| set >> corner & 1 == 1);
+            match set.count_ones() {
+                1 => assert_eq!(inside, [true, false, false, false]),
+                2 => assert_eq!(inside, [true, true, false, false]),
+                3 => assert_eq!(inside, [false, true, true, true]),
+                _ => {}
+            }
+        }
+    }
+
+    #[test]
+    fn moved_points_turn_no_tetrahedron_inside_out() {
+        let cones = cones();
+        let distances: Vec<Distance> = cones.iter().map(Distance::to).collect();
+        let lattice = Lattice::around(&cones, 1.0);
+        let mut moved = 0;
+        for block in lattice.blocks_near_surface(&distances).unwrap() {
+            let cutter = Cutter::new(&lattice, &block, &distances);
+            for x in 0..2 * SIDE {
+                for (y, z) in
+                    (x % 2..2 * SIDE).step_by(2).flat_map(|y| (x % 2..2 * SIDE).map(move |z| (y, z)))
+                {
+                    if (x - z) % 2 != 0 {
+                        continue;
+                    }
+                    let unmoved = lattice.position(offset(block.corner, [x, y, z]));
+                    moved += usize::from(cutter.sites[slot([x, y, z])].position != unmoved);
+                    for corners in all_tetrahedra([x, y, z]) {
+                        assert!(volume(corners.map(|corner| cutter.sites[slot(corner)].position)) > 1e-3);
+                    }
+                }
+            }
+        }
+        assert!(moved > 100, "{moved}");
     }
 }
