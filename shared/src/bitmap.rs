@@ -174,6 +174,14 @@ impl<'a> Bitmap<'a> {
         self.words.fill(0);
     }
 
+    /// Set what is clear and clear what is set, inside the image.
+    pub fn invert(&mut self) {
+        let n = self.size.row_words().max(1);
+        for i in 0..self.words.len() {
+            self.words[i] ^= self.valid(i % n);
+        }
+    }
+
     /// Take over the pixels of a bitmap of the same size.
     pub fn copy_from(&mut self, other: &Bitmap<'_>) {
         for (to, from) in self.words.iter_mut().zip(&*other.words) {
@@ -230,18 +238,22 @@ impl<'a> Bitmap<'a> {
 
     /// The eight neighbours of all pixels of word `i` of row `v`, in the order of [`Self::neighbours`].
     pub fn neighbour_words(&self, v: i32, i: usize) -> [Word; 8] {
-        let (above, here, below) = (self.row(v - 1), self.row(v), self.row(v + 1));
-        [
-            at(above, i),
-            east(above, i),
-            east(here, i),
-            east(below, i),
-            at(below, i),
-            west(below, i),
-            west(here, i),
-            west(above, i),
-        ]
+        neighbours_in_rows(self.row(v - 1), self.row(v), self.row(v + 1), i)
     }
+}
+
+/// [`Bitmap::neighbour_words`] of word `i` of the row `here`, from the rows themselves.
+pub fn neighbours_in_rows(above: &[Word], here: &[Word], below: &[Word], i: usize) -> [Word; 8] {
+    [
+        at(above, i),
+        east(above, i),
+        east(here, i),
+        east(below, i),
+        at(below, i),
+        west(below, i),
+        west(here, i),
+        west(above, i),
+    ]
 }
 
 /// Word `i` of a row, 0 beyond its end.
@@ -300,13 +312,21 @@ pub struct Plane<'a, T> {
     data: &'a mut [T],
 }
 
+impl<'a, T> Plane<'a, T> {
+    /// A plane over `data` as it stands, of which it takes the first [`Size::pixels`].
+    pub fn over(size: Size, data: &'a mut [T]) -> Result<Self, CapacityError> {
+        let limit = data.len();
+        let data = data.get_mut(..size.pixels()).ok_or(CapacityError { what: "pixels in a plane", limit })?;
+        Ok(Self { size, data })
+    }
+}
+
 impl<'a, T: Copy + Default> Plane<'a, T> {
     /// A plane of default values in `data`, of which it takes the first [`Size::pixels`].
     pub fn new(size: Size, data: &'a mut [T]) -> Result<Self, CapacityError> {
-        let limit = data.len();
-        let data = data.get_mut(..size.pixels()).ok_or(CapacityError { what: "pixels in a plane", limit })?;
-        data.fill(T::default());
-        Ok(Self { size, data })
+        let plane = Self::over(size, data)?;
+        plane.data.fill(T::default());
+        Ok(plane)
     }
 
     /// Width and height.

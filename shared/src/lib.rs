@@ -5,6 +5,7 @@
 pub mod bitmap;
 pub mod fixed;
 pub mod limits;
+pub mod pattern;
 pub mod point;
 
 pub mod stage;
