@@ -64,6 +64,34 @@ impl Pattern {
     }
 }
 
+/// An edge of the object.
+#[rustfmt::skip]
+const EDGE: Pattern = Pattern::parse([
+    "ooo",
+    " C ",
+    "xxx",
+]).expect("a drawing of 3x3 letters");
+
+/// A corner of the object.
+#[rustfmt::skip]
+const CORNER: Pattern = Pattern::parse([
+    " oo",
+    "xCo",
+    " x ",
+]).expect("a drawing of 3x3 letters");
+
+/// Letter L of the Golay alphabet on the square grid: edge and corner in turns, both turned by 90 degrees
+/// clockwise after each pair.
+pub const GOLAY_L: [Pattern; 8] = {
+    let mut patterns = [EDGE, CORNER, EDGE, CORNER, EDGE, CORNER, EDGE, CORNER];
+    let mut k = 2;
+    while k < 8 {
+        patterns[k] = patterns[k - 2].turned();
+        k += 1;
+    }
+    patterns
+};
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -152,7 +152,7 @@ pub fn histogram(grey: Grey<'_>) -> Histogram {
 /// it, compared exactly. 0 when there are no two classes.
 ///
 /// With n0 values of sum s0 up to the level, n1 above, and n of sum s in all, the variance is
-/// (n s0 - n0 s)^2 / (n0 n1), up to a constant. For n < 2^25 the square is below 2^114 and the divisor
+/// (n s0 - n0 s)^2 / (n0 n1), up to a constant. For n < 2^25 the square is below 2^112 and the divisor
 /// below 2^48; fractions are compared by whole part, then crosswise by remainder. A histogram of more
 /// pixels, which no raster of the core gives, is first scaled down by a power of two.
 pub fn otsu(histogram: &Histogram) -> u8 {

@@ -1,6 +1,6 @@
 //! Convex hull with its vertices in order, from the two ends of each row.
 //!
-//! Paper: section 4.1.1 with its [3]: candidate vertices are collected by scanning the image, then those
+//! Paper: section 4.1.1 with its reference 3: candidate vertices are collected by scanning the image, then those
 //! at which the polygon is not convex go. Method: the monotone chain of Andrew 1979, over rows instead of
 //! sorted points: rows come sorted.
 //!

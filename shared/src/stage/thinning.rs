@@ -15,15 +15,15 @@
 //! | scratch | the parallel rules: [`scratch_words`]; EDT-ordered: [`scratch_order`] entries and the distances |
 //! | cost | parallel: words x layers; EDT-ordered: pixels, and a few times what is left after the first sweep |
 //!
-//! Hit-or-miss and EDT-ordered keep the number of components and of holes, and never empty a component:
-//! an isolated pixel is a legal skeleton. Zhang-Suen and Guo-Hall are as published (OpenCV's `ximgproc`
-//! gives the same pixels, away from the border of the image, which it never thins).
+//! All but Zhang-Suen keep the number of components and of holes, so that no component is emptied: an
+//! isolated pixel is a legal skeleton. Zhang-Suen and Guo-Hall are as published (OpenCV's `ximgproc` gives
+//! the same pixels for an image in a clear frame; without one it never thins the image border).
 //!
 //! Not promised: lines one pixel wide. [`minimal`] gives those, for any rule.
 
 use crate::bitmap::{Bitmap, Plane, SetBits, Size, WORD_BITS, Word, at, neighbours_in_rows};
 use crate::limits::{CapacityError, MAX_SIDE};
-use crate::pattern::Pattern;
+use crate::pattern::GOLAY_L;
 use crate::stage::distance::DISTANCE_PX;
 
 /// Which pixels are deleted, and in which order.
@@ -77,33 +77,6 @@ pub fn thin(
         Rule::EdtOrdered => edt_ordered(bitmap, distance, order),
     }
 }
-
-/// An edge of the object, letter L of the Golay alphabet.
-#[rustfmt::skip]
-const EDGE: Pattern = Pattern::parse([
-    "ooo",
-    " C ",
-    "xxx",
-]).expect("a drawing of 3x3 letters");
-
-/// A corner of the object.
-#[rustfmt::skip]
-const CORNER: Pattern = Pattern::parse([
-    " oo",
-    "xCo",
-    " x ",
-]).expect("a drawing of 3x3 letters");
-
-/// Edge and corner in turns, both rotated by 90 degrees clockwise after each pair.
-const GOLAY_L: [Pattern; 8] = {
-    let mut patterns = [EDGE, CORNER, EDGE, CORNER, EDGE, CORNER, EDGE, CORNER];
-    let mut k = 2;
-    while k < 8 {
-        patterns[k] = patterns[k - 2].turned();
-        k += 1;
-    }
-    patterns
-};
 
 /// Delete in parallel what step 0 of `steps` finds, then what step 1 finds, and so on; all over again
 /// until a whole cycle finds nothing.
