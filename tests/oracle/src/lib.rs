@@ -1,1 +1,3 @@
 //! Independent oracles: naive twins, shapes with known truth, a mesh checker.
+
+pub mod graph;
