@@ -3,6 +3,7 @@
 #![forbid(unsafe_code)]
 
 pub mod bitmap;
+pub mod envelope;
 pub mod fixed;
 pub mod limits;
 pub mod point;

@@ -2,4 +2,5 @@
 //! output type of an earlier stage, never a later one; only `pipeline` names more than one neighbour.
 
 pub mod graph;
+pub mod nurbs;
 pub mod prune;

@@ -1,3 +1,4 @@
 //! Independent oracles: naive twins, shapes with known truth, a mesh checker.
 
 pub mod graph;
+pub mod nurbs;
