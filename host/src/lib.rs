@@ -2,16 +2,23 @@
 //! says what its pixels mean, the core of `shared` describes and matches it, the stages here grow the
 //! solid, and exports and reports write it down.
 
-pub mod bvh;
+// What goes in.
 pub mod calibration;
-pub mod evaluate;
-pub mod export;
+
+// What happens to it.
 pub mod memory;
-pub mod mesh;
-pub mod random;
-pub mod reconstruct;
-pub mod render;
-pub mod report;
-pub mod shape;
 pub mod stage;
+pub mod reconstruct;
+
+// What comes out.
+pub mod mesh;
+pub mod export;
+pub mod report;
+
+// What it is compared with: built-in solids, rendered and measured.
+pub mod shape;
 pub mod view;
+pub mod bvh;
+pub mod random;
+pub mod render;
+pub mod evaluate;

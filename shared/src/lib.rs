@@ -2,11 +2,14 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
-pub mod bitmap;
-pub mod envelope;
-pub mod fixed;
+// Foundation.
 pub mod limits;
-pub mod pattern;
-pub mod pipeline;
+pub mod fixed;
 pub mod point;
+pub mod bitmap;
+pub mod pattern;
+pub mod envelope;
+
+// What happens to a picture.
 pub mod stage;
+pub mod pipeline;

@@ -19,10 +19,11 @@
 //! **Bounds**: coordinates within +-2^20 (others are brought there), 2^20 balls; arcs over 65535 px are
 //! resampled at 65536 points; at most [`MAX_CONTROLS`] control points or what the lent memory holds,
 //! beyond which they stand farther apart. **Error**: control points within 1/256 px of the exact
-//! minimum, evaluation within 1/256 px. **Cost**: 26 products per px of arc, then [`Envelope`] for 4
-//! right sides. **Deviations**: the paper gives no rule for control points, degree, knots or weights; plain
-//! least squares explode at the tips, hence the penalty. **Not promised**: the curve passes near its
-//! balls, not through them; the radius is floored at [`LEAST_RADIUS`] in evaluation, not in the controls.
+//! minimum, evaluation within half of that. **Cost**: about 60 products and 12 divisions per px of arc, then
+//! an [`Envelope`] for 4 right sides. **Deviations**: the paper gives no rule for control points, degree,
+//! knots or weights; plain least squares explode at the tips, hence the penalty. **Not promised**: the
+//! curve passes near its balls, not through them; the radius is floored at [`LEAST_RADIUS`] in
+//! evaluation, not in the controls.
 
 use crate::envelope::{ENTRY_BITS, Envelope};
 use crate::fixed::{ONE, PX, div_round, saturate};
@@ -38,13 +39,15 @@ pub const LEAST_RADIUS: i32 = 77;
 const DEGREE: usize = 3;
 /// Largest magnitude of a coordinate, 1/256 px.
 const RANGE: i32 = 1 << 20;
-/// Largest number of balls, so that arc length x samples stays below 2^63.
+/// Largest number of balls, so that the arc length stays below 2^50.
 const MAX_BALLS: usize = 1 << 20;
 /// Steps in which a span is measured by chords.
 const CHORDS: i32 = 16;
 /// Bits of a basis function's value.
 const BASIS_BITS: u32 = ENTRY_BITS;
-/// Bits by which arc lengths are finer than 1/256 px, and resampled channels too.
+/// Bits by which arc lengths are finer than 1/256 px: the rounding of thousands of chords adds up.
+const ARC_BITS: u32 = 8;
+/// Bits by which resampled channels are finer than 1/256 px.
 const FINE_BITS: u32 = 4;
 /// Bits by which unknowns are finer than 1/256 px.
 const SIDE_BITS: u32 = 12;
@@ -154,11 +157,11 @@ impl<'a> Nurbs<'a> {
         let chord_at =
             |k: i32| chord(self.evaluate(k * (ONE / CHORDS)), self.evaluate((k + 1) * (ONE / CHORDS)));
         let length: i64 = (0..chord_count).map(chord_at).sum();
-        let pieces = div_round(length, (step.max(1) as i64) << FINE_BITS).max((length > 0) as i64);
+        let pieces = div_round(length, (step.max(1) as i64) << ARC_BITS).max((length > 0) as i64);
         push(balls, self.evaluate(0), "balls")?;
         let (mut k, mut start, mut across) = (0, 0, chord_at(0));
         for piece in 1..pieces {
-            let target = length / pieces * piece + length % pieces * piece / pieces;
+            let target = part(length, piece, pieces);
             while start + across < target && k + 1 < chord_count {
                 start += across;
                 k += 1;
@@ -187,7 +190,7 @@ pub fn fit(
     }
     let (Some(first), Some(last)) = (samples.first(), samples.last()) else { return Ok(0) };
     let line = Polyline::new(samples, closed);
-    if !closed && (samples.len() < 6 || line.length < 3 << (8 + FINE_BITS)) {
+    if !closed && (samples.len() < 6 || line.length < 3 << (8 + ARC_BITS)) {
         for k in 0..=DEGREE as i64 {
             let (a, b) = (first.ball.bounded(), last.ball.bounded());
             let part = |c: usize| (a[c] + div_round((b[c] - a[c]) * k, DEGREE as i64)) as i32;
@@ -201,7 +204,7 @@ pub fn fit(
     if limit <= DEGREE {
         return Err(CapacityError { what: "control points", limit });
     }
-    let spacing = (params.spacing.max(PX) as i64) << FINE_BITS;
+    let spacing = (params.spacing.max(PX) as i64) << ARC_BITS;
     let count = ((line.length + spacing - 1) / spacing + DEGREE as i64).clamp(DEGREE as i64 + 1, limit as i64)
         as usize;
     let sides = &mut scratch.sides[..count];
@@ -226,17 +229,20 @@ fn accumulate(
     let spans = span_count(count, closed);
     let smoothing = params.smoothing.clamp(ONE / 1024, 16 * ONE) as i64;
     let end_weight = params.end_weight.clamp(1, 100) as i64;
-    let pieces = (line.length >> (8 + FINE_BITS)).clamp(7 + closed as i64, 0xFFFF);
+    let pieces = (line.length >> (8 + ARC_BITS)).clamp(7 + closed as i64, 0xFFFF);
     // The diagonal holds at most the samples of a span (basis functions integrate to a span), an end,
     // and 1 + 4 + 1 of the penalty; divided by this power of two it stays below 1.
     let largest = pieces / spans as i64 + 4 + end_weight + 6 * smoothing / ONE as i64 + 6;
     let bits = largest.ilog2() + 1;
 
+    // Bits between a product of basis function and channel, and a right side.
+    let drop = BASIS_BITS + FINE_BITS + bits - SIDE_BITS;
+
     sides.fill([0; 4]);
     let mut cursor = Cursor::default();
     let samples = if closed { pieces } else { pieces + 1 };
     for i in 0..samples {
-        let (channels, weight) = line.at(div_round(line.length * i, pieces), &mut cursor);
+        let (channels, weight) = line.at(part(line.length, i, pieces), &mut cursor);
         let is_end = !closed && (i == 0 || i == pieces);
         let weight = if is_end { weight * end_weight } else { weight };
         let t = div_round(((spans as i64) << 16) * i, pieces) as i32;
@@ -251,7 +257,7 @@ fn accumulate(
             let side = &mut sides[(first + a) % count];
             for c in 0..4 {
                 let term = weighted * (channels[c] - (origin[c] << FINE_BITS));
-                side[c] += div_round(term, 1 << (BASIS_BITS + FINE_BITS + bits - SIDE_BITS));
+                side[c] += (term + (1 << (drop - 1))) >> drop;
             }
         }
     }
@@ -298,18 +304,24 @@ fn basis(spans: usize, closed: bool, t: i32) -> (usize, [i64; 4]) {
     (span as usize, values)
 }
 
-/// Distance of two centres in (u, v), 1/4096 px.
+/// `length * i / pieces`, rounded down, for 0 <= i <= pieces, without the large product.
+const fn part(length: i64, i: i64, pieces: i64) -> i64 {
+    length / pieces * i + length % pieces * i / pieces
+}
+
+/// Distance of two centres in (u, v), 1/65536 px; below 2^30.
 fn chord(a: Ball, b: Ball) -> i64 {
     let ([au, av, ..], [bu, bv, ..]) = (a.bounded(), b.bounded());
     let square = (au - bu) * (au - bu) + (av - bv) * (av - bv);
-    ((square as u64) << (2 * FINE_BITS)).isqrt() as i64
+    // One bit more, to round: lengths rounded down would add up to a drift.
+    (((square as u64) << (2 * ARC_BITS + 2)).isqrt() as i64 + 1) / 2
 }
 
 /// Samples joined by straight segments, the last to the first when closed.
 struct Polyline<'a> {
     samples: &'a [Sample],
     closed: bool,
-    /// 1/4096 px.
+    /// 1/65536 px.
     length: i64,
 }
 
