@@ -74,8 +74,8 @@ impl Shape {
     #[must_use]
     pub const fn cell(self) -> f64 {
         match self {
-            Self::Screwdriver => 1.25,
-            Self::Teapot => 2.0,
+            Self::Screwdriver => 1.4,
+            Self::Teapot => 2.2,
             Self::Torus | Self::TorusTilt => 2.25,
             Self::Capsule | Self::Block | Self::Mouse => 2.5,
             Self::Sphere => 3.0,
