@@ -56,13 +56,15 @@ impl Bvh {
     /// The tree over the faces of a mesh.
     #[must_use]
     pub fn new(mesh: &Mesh) -> Self {
-        Self::of_triangles(mesh.faces.iter().map(|face| face.map(|v| mesh.vertices[v as usize])).collect())
+        let corners = |face: &[u32; 3]| face.map(|v| mesh.vertices[v as usize]);
+        let triangles: Vec<_> = mesh.faces.iter().map(corners).collect();
+        Self::of_triangles(&triangles)
     }
 
     /// The tree over loose triangles; for nearest points these may be segments or points, with
     /// corners that coincide.
     #[must_use]
-    pub fn of_triangles(triangles: Vec<[Point3<f64>; 3]>) -> Self {
+    pub fn of_triangles(triangles: &[[Point3<f64>; 3]]) -> Self {
         let item = |(face, corners): (usize, &[Point3<f64>; 3])| {
             let bounds = Bounds::of(corners);
             Item { bounds, middle: nalgebra::center(&bounds.low, &bounds.high), face: face as u32 }

@@ -31,7 +31,7 @@ fn first_hits_are_those_of_the_naive_twin() {
     let mut random = Random::new(1);
     for count in [0, 1, 5, 300] {
         let triangles = triangles(&mut random, count);
-        let bvh = Bvh::of_triangles(triangles.clone());
+        let bvh = Bvh::of_triangles(&triangles);
         for _ in 0..2000 {
             let (origin, direction) = (vector(&mut random, 120.0).into(), vector(&mut random, 3.0));
             let hit = bvh.first_hit(&origin, &direction);
@@ -52,7 +52,7 @@ fn first_hits_are_those_of_the_naive_twin() {
 fn distances_are_those_of_dense_points() {
     let mut random = Random::new(2);
     let triangles = triangles(&mut random, 40);
-    let bvh = Bvh::of_triangles(triangles.clone());
+    let bvh = Bvh::of_triangles(&triangles);
     let steps = 60;
     for _ in 0..100 {
         let point = Point3::from(vector(&mut random, 120.0));
@@ -73,9 +73,9 @@ fn distances_are_those_of_dense_points() {
 #[test]
 fn segments_and_points_have_distances_too() {
     let (a, b) = (Point3::new(1.0, 0.0, 0.0), Point3::new(3.0, 0.0, 0.0));
-    assert_eq!(Bvh::of_triangles(vec![[a, b, b]]).distance(&Point3::new(2.0, 2.0, 0.0)), 2.0);
-    assert_eq!(Bvh::of_triangles(vec![[a, a, a]]).distance(&Point3::new(1.0, 0.0, -3.0)), 3.0);
-    assert_eq!(Bvh::of_triangles(vec![]).distance(&a), f64::INFINITY);
+    assert_eq!(Bvh::of_triangles(&[[a, b, b]]).distance(&Point3::new(2.0, 2.0, 0.0)), 2.0);
+    assert_eq!(Bvh::of_triangles(&[[a, a, a]]).distance(&Point3::new(1.0, 0.0, -3.0)), 3.0);
+    assert_eq!(Bvh::of_triangles(&[]).distance(&a), f64::INFINITY);
 }
 
 /// From the middle of a closed mesh every ray hits, even those aimed at edges.

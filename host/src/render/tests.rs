@@ -38,7 +38,7 @@ fn edges_are_right_to_a_hundredth_of_a_pixel() {
     let faces = vec![[0, 3, 1], [1, 3, 2], [0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]];
     let [image] = &render(&Mesh { vertices, faces }, &[view])[..] else { panic!("one view, one image") };
 
-    let grey = DARKEST - (BRIGHTEST - DARKEST) * LIGHT.z / LIGHT.norm() * LIGHT.norm();
+    let grey = DARKEST - (BRIGHTEST - DARKEST) * LIGHT.z;
     let (mut area, mut first) = (0.0, [0.0; 2]);
     for (u, v, pixel) in image.enumerate_pixels() {
         let cover = (f64::from(pixel[0]) - BACKGROUND) / (grey - BACKGROUND);
