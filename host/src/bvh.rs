@@ -5,7 +5,8 @@
 //!
 //! No ray slips between two triangles that share an edge, and none hits both of them there: the side
 //! on which a ray passes an edge is the sign of one product, which is exactly opposite for the edge
-//! taken the other way round, and a ray through the edge is given to one of the two by name.
+//! taken the other way round, and a ray through the edge is given to one of the two by name. (A ray
+//! that meets a vertex to the last bit may still miss.)
 //! A tree of our own rather than a collision library's, as both queries together are this one small
 //! file, on `nalgebra` types, with the same bits on every machine.
 
@@ -16,7 +17,7 @@ use crate::mesh::Mesh;
 /// Largest number of triangles in a leaf.
 const LEAF: usize = 4;
 /// Bins along a side among which a box is divided.
-const BINS: usize = 16;
+const BINS: usize = 8;
 /// How much later a ray may leave a box than computed, so that rounding loses no triangle.
 const SLACK: f64 = 1.0 + 1e-12;
 
@@ -55,13 +56,15 @@ impl Bvh {
     /// The tree over the faces of a mesh.
     #[must_use]
     pub fn new(mesh: &Mesh) -> Self {
-        Self::of_triangles(mesh.faces.iter().map(|face| face.map(|v| mesh.vertices[v as usize])).collect())
+        let corners = |face: &[u32; 3]| face.map(|v| mesh.vertices[v as usize]);
+        let triangles: Vec<_> = mesh.faces.iter().map(corners).collect();
+        Self::of_triangles(&triangles)
     }
 
     /// The tree over loose triangles; for nearest points these may be segments or points, with
     /// corners that coincide.
     #[must_use]
-    pub fn of_triangles(triangles: Vec<[Point3<f64>; 3]>) -> Self {
+    pub fn of_triangles(triangles: &[[Point3<f64>; 3]]) -> Self {
         let item = |(face, corners): (usize, &[Point3<f64>; 3])| {
             let bounds = Bounds::of(corners);
             Item { bounds, middle: nalgebra::center(&bounds.low, &bounds.high), face: face as u32 }
@@ -183,17 +186,26 @@ impl Bounds {
 
     /// Where a ray enters the box, 0 from inside; infinite if it misses.
     fn entry(&self, ray: &Ray) -> f64 {
-        let a = (self.low - ray.origin).component_mul(&ray.inverse);
-        let b = (self.high - ray.origin).component_mul(&ray.inverse);
-        let (near, far) = (a.inf(&b), a.sup(&b));
-        let enter = near.x.max(near.y).max(near.z).max(0.0);
-        let leave = far.x.min(far.y).min(far.z);
+        let (mut enter, mut leave) = (0.0_f64, f64::INFINITY);
+        for axis in 0..3 {
+            let a = (self.low[axis] - ray.origin[axis]) * ray.inverse[axis];
+            let b = (self.high[axis] - ray.origin[axis]) * ray.inverse[axis];
+            let (near, far) = if a < b { (a, b) } else { (b, a) };
+            enter = if near > enter { near } else { enter };
+            leave = if far < leave { far } else { leave };
+        }
         if enter <= leave * SLACK { enter } else { f64::INFINITY }
     }
 
     /// Square of the distance from a point, 0 from inside.
     fn distance_squared(&self, point: &Point3<f64>) -> f64 {
-        (self.low - point).sup(&(point - self.high)).sup(&Vector3::zeros()).norm_squared()
+        let outside = |axis: usize| {
+            let below = self.low[axis] - point[axis];
+            let above = point[axis] - self.high[axis];
+            let out = if below > above { below } else { above };
+            if out > 0.0 { out * out } else { 0.0 }
+        };
+        outside(0) + outside(1) + outside(2)
     }
 
     /// Half the area of its surface, which is in proportion to the rays that meet it.
@@ -244,8 +256,9 @@ fn divide(items: &mut [Item]) -> usize {
         let (bounds, count) = bins.iter().fold((Bounds::EMPTY, 0), |(b, n), bin| (b.with(&bin.0), n + bin.1));
         (count, bounds.half_area() * count as f64)
     };
-    let cost = |plane: usize| side(&bins[..plane]).1 + side(&bins[plane..]).1;
-    let plane = (1..BINS).min_by(|&a, &b| cost(a).total_cmp(&cost(b))).unwrap_or(1);
+    let cost = |plane: usize| (plane, side(&bins[..plane]).1 + side(&bins[plane..]).1);
+    let least = (1..BINS).map(cost).min_by(|a, b| a.1.total_cmp(&b.1));
+    let plane = least.map_or(1, |(plane, _)| plane);
     let count = side(&bins[..plane]).0;
     if count.min(items.len() - count) >= items.len() / 8 {
         items.sort_by_key(|item| bin(item) >= plane);

@@ -2,7 +2,7 @@
 //!
 //! In: two meshes with their trees of boxes. Out: statistics of the exact distances from points spread
 //! evenly over either surface to the other. The points are drawn in equal steps of area, one at random
-//! in each step (stratified sampling), which halves the error of independent points or better. Cost:
+//! in each step (stratified sampling), which leaves less to chance than independent points. Cost:
 //! O(samples log faces).
 
 use nalgebra::Point3;

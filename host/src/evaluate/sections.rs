@@ -123,6 +123,6 @@ fn outline(mesh: &Mesh, axis: &Vector3<f64>, height: f64) -> Vec<Point3<f64>> {
 
 /// Mean distance from points to the nearest of others.
 fn mean_distance(from: &[Point3<f64>], to: &[Point3<f64>]) -> f64 {
-    let others = Bvh::of_triangles(to.iter().map(|&p| [p; 3]).collect());
+    let others = Bvh::of_triangles(&to.iter().map(|&p| [p; 3]).collect::<Vec<_>>());
     from.iter().map(|point| others.distance(point)).sum::<f64>() / from.len() as f64
 }

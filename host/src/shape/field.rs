@@ -66,9 +66,10 @@ impl Tube {
         self.pieces.iter().map(|piece| piece.at(p)).fold(f64::INFINITY, f64::min)
     }
 
-    /// Distance to the box around it: never more than to the tube itself.
+    /// A lower bound of the distance: that to the box around it, and none within the box.
     pub(super) fn at_least(&self, p: &Point3<f64>) -> f64 {
-        (self.low - p).sup(&(p - self.high)).sup(&Vector3::zeros()).norm()
+        let outside = (self.low - p).sup(&(p - self.high)).sup(&Vector3::zeros()).norm();
+        if outside > 0.0 { outside } else { f64::NEG_INFINITY }
     }
 }
 

@@ -21,6 +21,9 @@ mod teapot;
 /// Where the solids stand, mm.
 const PLACE: Point3<f64> = Point3::new(30.0, 0.0, 450.0);
 
+/// A signed function of a point in mm: negative inside a solid, with slope at most 1.
+pub type Field = Box<dyn Fn(&Point3<f64>) -> f64 + Send + Sync>;
+
 /// A built-in solid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Shape {
@@ -74,17 +77,17 @@ impl Shape {
     #[must_use]
     pub const fn cell(self) -> f64 {
         match self {
-            Self::Screwdriver => 1.25,
-            Self::Teapot => 2.0,
+            Self::Screwdriver => 1.4,
+            Self::Teapot => 2.2,
             Self::Torus | Self::TorusTilt => 2.25,
             Self::Capsule | Self::Block | Self::Mouse => 2.5,
             Self::Sphere => 3.0,
         }
     }
 
-    /// The signed function: negative inside, with slope at most 1.
+    /// The signed function.
     #[must_use]
-    pub fn field(self) -> Box<dyn Fn(&Point3<f64>) -> f64 + Send + Sync> {
+    pub fn field(self) -> Field {
         let Solid { field, turn, .. } = self.solid();
         Box::new(move |point| field(&Point3::from(turn.tr_mul(&(point - PLACE)))))
     }
@@ -154,7 +157,7 @@ impl FromStr for Shape {
 
 /// A solid in a frame of its own, and how it is turned into the camera's.
 struct Solid {
-    field: Box<dyn Fn(&Point3<f64>) -> f64 + Send + Sync>,
+    field: Field,
     low: Point3<f64>,
     high: Point3<f64>,
     turn: Matrix3<f64>,

@@ -36,7 +36,7 @@ const EDGE: f64 = 0.9;
 const GRIND: f64 = 0.16;
 
 pub(super) fn solid() -> Solid {
-    let turned = Revolution::new(&smooth_line(&OUTLINE, 6));
+    let turned = Revolution::new(&smooth_line(&OUTLINE, 4));
     let slope = (1.0 + GRIND * GRIND).sqrt();
     Solid {
         field: Box::new(move |p| {

@@ -61,7 +61,7 @@ const HANDLE_BLEND: f64 = 6.0;
 const MIDDLE: f64 = 46.0;
 
 pub(super) fn solid() -> Solid {
-    let pot = Revolution::new(&smooth_line(&OUTLINE, 5));
+    let pot = Revolution::new(&smooth_line(&OUTLINE, 8));
     let spout = Tube::new(&smooth_line(&SPOUT, 5));
     let handle = Tube::new(&smooth_line(&HANDLE, 5));
     Solid {
