@@ -13,11 +13,11 @@ use crate::stage::balls::{self, Ball, Edge, boundary_rays, distance_to_rays, px2
 use crate::stage::rectify::{PixelBox, Rectification, RectifiedCamera, RectifyError};
 use crate::stage::refine::refine;
 use crate::stage::smooth::smooth;
-use crate::stage::solid::{SolidBall, solid};
+use crate::stage::solid::{SolidBall, outermost, solid};
 use crate::stage::surface::{RoundCone, SurfaceError, surface};
 use crate::stage::triangulate::triangulate;
 use image::GrayImage;
-use nalgebra::{Point2, Point3};
+use nalgebra::{Point2, Point3, Vector3};
 use shared::bitmap::{Grey, Size};
 use shared::fixed::PX;
 use shared::pipeline::{self, Finding, Memory, Observer, Outcome, Settings, Side};
@@ -56,6 +56,9 @@ pub struct Options {
     /// Grid spacing of the mesh, mm; by default that of a pixel at the object.
     pub cell: Option<f64>,
 }
+
+/// Cells along the diagonal of a mesh at most, unless the user says otherwise.
+const MAX_CELLS: f64 = 300.0;
 
 /// A curve or a set of points in space.
 #[derive(Clone, Debug, Default)]
@@ -155,7 +158,7 @@ pub fn reconstruct(
     if grown.cones.is_empty() {
         return Err(Refusal::Behind);
     }
-    let cell = options.cell.unwrap_or_else(|| pixel_at(&camera, &grown.cones));
+    let cell = options.cell.unwrap_or_else(|| default_cell(&camera, &grown.cones));
     let body = keep_largest_body(&surface(&grown.cones, cell)?);
     clock.lap("surface");
     let turned = |curves: Curves| Curves {
@@ -257,10 +260,16 @@ fn object_box(image: &GrayImage, side: Side, options: &Options) -> Result<PixelB
     Ok(PixelBox { min: corner(bounds.min), max: corner(bounds.max) })
 }
 
-/// The size of a pixel at the nearest ball, mm.
-fn pixel_at(camera: &RectifiedCamera, cones: &[RoundCone]) -> f64 {
-    let depth = cones.iter().map(|c| c.centres[0].z).fold(f64::INFINITY, f64::min);
-    2.0 * depth / camera.f
+/// The mesh's grid spacing by default, mm: two pixels at the nearest ball, but no more than
+/// [`MAX_CELLS`] along the diagonal, which only a model that is wrong would have.
+fn default_cell(camera: &RectifiedCamera, cones: &[RoundCone]) -> f64 {
+    let balls = || cones.iter().flat_map(|c| c.centres.into_iter().zip(c.radii));
+    let depth = balls().map(|(c, _)| c.z).fold(f64::INFINITY, f64::min);
+    let low =
+        balls().fold(Point3::from([f64::INFINITY; 3]), |low, (c, r)| low.inf(&(c - Vector3::repeat(r))));
+    let high =
+        balls().fold(Point3::from([-f64::INFINITY; 3]), |high, (c, r)| high.sup(&(c + Vector3::repeat(r))));
+    (2.0 * depth / camera.f).max((high - low).norm() / MAX_CELLS)
 }
 
 /// The solid in rectified axes.
@@ -287,8 +296,9 @@ fn grow(camera: &RectifiedCamera, memory: &Memory<'_>, outcome: &Outcome, clock:
     };
     let solid_balls: Vec<SolidBall> = grown.iter().filter_map(ball).collect();
     clock.lap("radii");
+    let pixel = solid_balls.iter().map(|b| b.centre.z / camera.f).fold(f64::INFINITY, f64::min);
     Grown {
-        cones: solid(&solid_balls, eye.loops),
+        cones: solid(&outermost(&solid_balls, pixel), eye.loops),
         skeleton: skeleton(memory, &solid_balls),
         boundary: boundary(camera, eye.loops, &edges),
     }

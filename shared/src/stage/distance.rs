@@ -35,6 +35,9 @@ pub struct Parabola {
 }
 
 impl Parabola {
+    /// A value to fill scratch memory with.
+    pub const NONE: Self = Self { apex: 0, height: 0, from: 0 };
+
     /// Its value at a position, px^2; below 2^25.
     const fn at(self, x: u16) -> u32 {
         (self.apex.abs_diff(x) as u32).pow(2) + (self.height as u32).pow(2)

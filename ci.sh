@@ -1,0 +1,106 @@
+#!/usr/bin/env bash
+# The one list of checks.
+#
+#   ./ci.sh            everything
+#   ./ci.sh NAME...    single parts: fmt lint test doc firmware
+#
+# Installs what a fresh Debian machine with rustup lacks. The last line is "N passed, N failed", counting
+# tests, and one for each check that is not made of tests. A part that ran no test fails.
+set -uo pipefail
+cd "$(dirname "$0")" || exit 1
+
+PARTS=(fmt lint test doc firmware)
+TARGET=thumbv7em-none-eabihf
+CASES=../shared/eval
+
+passed=0
+failed=0
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+
+# Run a command as one check.
+check() {
+    echo "+ $*"
+    if "$@"; then passed=$((passed + 1)); else failed=$((failed + 1)); echo "FAILED: $*"; fi
+}
+
+# Run a command that prints cargo's "test result:" lines, and count its tests.
+tests() {
+    echo "+ $*"
+    "$@" 2>&1 | tee "$log"
+    local status=$? ok bad
+    ok=$(awk '/^test result:/ { n += $4 } END { print n + 0 }' "$log")
+    bad=$(awk '/^test result:/ { n += $6 } END { print n + 0 }' "$log")
+    if [ "$status" -ne 0 ] && [ "$bad" -eq 0 ]; then bad=1; fi
+    if [ "$ok" -eq 0 ] && [ "$bad" -eq 0 ]; then echo "FAILED: no test ran"; bad=1; fi
+    passed=$((passed + ok))
+    failed=$((failed + bad))
+}
+
+# apt-get, as whoever may.
+install() {
+    local sudo=
+    [ "$(id -u)" -eq 0 ] || sudo=sudo
+    $sudo apt-get update -qq && DEBIAN_FRONTEND=noninteractive $sudo apt-get install -y -qq --no-install-recommends "$@"
+}
+
+need() {
+    command -v "$1" >/dev/null || install "${@:2}"
+}
+
+prepare() {
+    need cc gcc libc6-dev
+    if ! command -v cargo >/dev/null; then
+        echo "cargo is missing: install Rust with rustup (https://rustup.rs), then run this again"
+        exit 1
+    fi
+    cargo fmt --version >/dev/null 2>&1 || rustup component add rustfmt
+    cargo clippy --version >/dev/null 2>&1 || rustup component add clippy
+}
+
+# The Python that runs the ruler of the shared cases, where these are.
+ruler() {
+    local venv=target/eval-venv
+    [ -d "$CASES" ] || { echo "SKIPPED: $CASES is not here, so the cases with known truth are not run"; return; }
+    if ! "$venv/bin/python" -c 'import cv2, trimesh, embreex' 2>/dev/null; then
+        need python3 python3 python3-venv
+        python3 -m venv "$venv" || { install python3-venv && python3 -m venv "$venv"; }
+        "$venv/bin/pip" install -q --disable-pip-version-check -r "$CASES/requirements.txt"
+    fi
+    export OSSATURE_RULER=$PWD/$venv/bin/python
+}
+
+part_fmt() { check cargo fmt --all --check; }
+
+part_lint() { check cargo clippy -q --workspace --all-targets --locked -- -D warnings; }
+
+part_test() {
+    ruler
+    tests cargo test --workspace --locked
+    # The frozen bits again, as the optimiser makes them, and the command that a newcomer runs first.
+    tests cargo test --release --locked -p system-tests --test frozen
+    check cargo run -q --release --locked -p host -- demo --out target/ci-demo
+}
+
+part_doc() { RUSTDOCFLAGS="-D warnings" check cargo doc -q --workspace --no-deps --locked; }
+
+part_firmware() {
+    rustup target list --installed | grep -qx "$TARGET" || rustup target add "$TARGET"
+    check cargo build -q -p firmware --target "$TARGET" --release --locked
+}
+
+parts=("$@")
+[ "${#parts[@]}" -gt 0 ] || parts=("${PARTS[@]}")
+for part in "${parts[@]}"; do
+    declare -F "part_$part" >/dev/null || { echo "unknown part '$part'; there are: ${PARTS[*]}"; exit 2; }
+done
+prepare
+for part in "${parts[@]}"; do
+    echo "== $part"
+    start=$SECONDS before=$((passed + failed))
+    "part_$part"
+    [ $((passed + failed)) -gt "$before" ] || failed=$((failed + 1))
+    echo "== $part: $((SECONDS - start)) s"
+done
+echo "$passed passed, $failed failed"
+[ "$failed" -eq 0 ]
