@@ -4,12 +4,26 @@ fn main() {
     let l = image::open(&a[1]).unwrap().to_luma8();
     let r = image::open(&a[2]).unwrap().to_luma8();
     let c = calibration::StereoCamera::read(&a[3]).unwrap();
+    let f = |k: &str| a.iter().any(|x| x == k);
+    use reconstruct::*;
+    let o = Options {
+        skeleton: if f("nurbs") { Skeleton::Nurbs } else { Skeleton::Full },
+        radius: if f("boundary") {
+            Radius::Boundary
+        } else if f("transform") {
+            Radius::Transform
+        } else {
+            Radius::Rays
+        },
+        pieces: if f("balls") { Pieces::Balls } else { Pieces::Cones },
+        ..Default::default()
+    };
     let mode = if a.len() > 5 && a[5].starts_with("paper") {
         reconstruct::Mode::Paper { omega: 3 }
     } else {
         reconstruct::Mode::Default
     };
-    match reconstruct::reconstruct(l, r, &c, &reconstruct::Options { mode, ..Default::default() }, &mut ()) {
+    match reconstruct::reconstruct(l, r, &c, &Options { mode, ..o }, &mut ()) {
         Ok(m) => {
             std::fs::create_dir_all(&a[4]).unwrap();
             export::ply::write_mesh(std::path::Path::new(&format!("{}/model.ply", a[4])), &m.mesh, &[])

@@ -9,11 +9,12 @@ use crate::calibration::StereoCamera;
 use crate::memory::Storage;
 use crate::mesh::Mesh;
 use crate::mesh::body::keep_largest_body;
-use crate::stage::balls::{self, Ball, Edge, boundary_rays, distance_to_rays, px2};
+use crate::stage::balls::{self, Ball, Edge, boundary_rays, distance_to_points, distance_to_rays, px2};
+use crate::stage::curve::curve_balls;
 use crate::stage::rectify::{PixelBox, Rectification, RectifiedCamera, RectifyError};
 use crate::stage::refine::refine;
 use crate::stage::smooth::smooth;
-use crate::stage::solid::{SolidBall, outermost, solid};
+use crate::stage::solid::{Chain, SolidBall, outermost, solid};
 use crate::stage::surface::{RoundCone, SurfaceError, surface};
 use crate::stage::triangulate::triangulate;
 use image::GrayImage;
@@ -23,9 +24,11 @@ use shared::fixed::PX;
 use shared::pipeline::{self, Finding, Memory, Observer, Outcome, Settings, Side};
 use shared::stage::binarise;
 use shared::stage::clean;
+use shared::stage::contour::ContourLoop;
 use shared::stage::correspond::PaperMatching;
 use shared::stage::depth::Optics;
 use shared::stage::nearest::Pair;
+use shared::stage::prune::Pruning;
 use shared::stage::thinning::Rule;
 use std::time::{Duration, Instant};
 
@@ -42,6 +45,38 @@ pub enum Mode {
     },
 }
 
+/// Which balls make the solid.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Skeleton {
+    /// One at every contour point: all medial balls.
+    #[default]
+    Full,
+    /// Those along the curves of the pruned skeleton, its compact description.
+    Nurbs,
+}
+
+/// How far a ball reaches.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Radius {
+    /// To the nearest viewing ray of the left boundary.
+    #[default]
+    Rays,
+    /// To the nearest boundary point in space: the paper's rule.
+    Boundary,
+    /// As far as its image in the left view says: the distance transform.
+    Transform,
+}
+
+/// What the solid is made of.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Pieces {
+    /// Round cones between neighbouring balls.
+    #[default]
+    Cones,
+    /// The balls alone.
+    Balls,
+}
+
 /// The choices of a reconstruction.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Options {
@@ -49,6 +84,14 @@ pub struct Options {
     pub mode: Mode,
     /// Thinning rule, if not the mode's own.
     pub thinning: Option<Rule>,
+    /// Which balls make the solid (default mode).
+    pub skeleton: Skeleton,
+    /// Edges that pruning leaves of the skeleton, if not as many as stand out.
+    pub branches: Option<u16>,
+    /// How far a ball reaches (default mode).
+    pub radius: Radius,
+    /// What the solid is made of (default mode).
+    pub pieces: Pieces,
     /// Level between object and background.
     pub threshold: binarise::Threshold,
     /// Whether the object is bright or dark.
@@ -151,7 +194,7 @@ pub fn reconstruct(
     clock.lap("core");
 
     let grown = match options.mode {
-        Mode::Default => grow(&camera, &memory, &outcome, &mut clock),
+        Mode::Default => grow(&camera, &memory, &outcome, options, &mut clock)?,
         Mode::Paper { .. } => grow_as_paper(&camera, &memory),
     };
     clock.lap("grow");
@@ -217,6 +260,7 @@ fn settings(camera: &RectifiedCamera, options: &Options) -> Settings {
         threshold: options.threshold,
         polarity: options.polarity,
         thinning: options.thinning.unwrap_or(chosen.thinning),
+        pruning: options.branches.map_or(chosen.pruning, Pruning::Branches),
         ..chosen
     }
 }
@@ -279,29 +323,52 @@ struct Grown {
     boundary: Curves,
 }
 
-/// Balls at every contour point, their depth refined and smoothed, radii from the viewing rays.
-fn grow(camera: &RectifiedCamera, memory: &Memory<'_>, outcome: &Outcome, clock: &mut Clock) -> Grown {
+/// Balls, their depth refined and smoothed, and how far they reach.
+fn grow(
+    camera: &RectifiedCamera,
+    memory: &Memory<'_>,
+    outcome: &Outcome,
+    options: &Options,
+    clock: &mut Clock,
+) -> Result<Grown, Finding> {
     let eye = &memory.eyes[0];
     let edges = balls::edges(eye.contour, memory.matches);
-    let mut grown = balls::balls(camera, &edges, memory.balls, memory.depths);
+    let (mut grown, chains) = match options.skeleton {
+        Skeleton::Full => {
+            let chain = |l: &ContourLoop| Chain { start: l.start, len: l.len, closed: true };
+            let all = balls::balls(camera, &edges, memory.balls, memory.depths);
+            (all, eye.loops.iter().map(chain).collect())
+        }
+        Skeleton::Nurbs => curve_balls(camera, &edges, eye.branches, eye.controls)?,
+    };
     refine(camera, &edges, &mut grown);
     clock.lap("refine");
     smooth(&mut grown, &outcome.plane);
     clock.lap("smooth");
+    let boundary = boundary(camera, eye.loops, &edges);
     let rays = boundary_rays(camera, &edges);
-    let ball = |b: &Ball| {
-        let centre = b.centre(camera)?;
-        let radius = distance_to_rays(&rays, &centre);
-        radius.is_finite().then_some(SolidBall { centre, radius, at: b.at, grown_from: b.contacts[0] })
+    let reach = |ball: &Ball, centre: &Point3<f64>| match options.radius {
+        Radius::Rays => distance_to_rays(&rays, centre),
+        Radius::Boundary => distance_to_points(&boundary.points, centre),
+        Radius::Transform => ball.rho * centre.z / camera.f.hypot(ball.rho),
     };
-    let solid_balls: Vec<SolidBall> = grown.iter().filter_map(ball).collect();
+    let solid_ball = |ball: &Ball| {
+        let centre = ball.centre(camera)?;
+        let radius = reach(ball, &centre);
+        let solid = SolidBall { centre, radius, at: ball.at, place: ball.place };
+        (radius.is_finite() && radius > 0.0).then_some(solid)
+    };
+    let solid_balls: Vec<SolidBall> = grown.iter().filter_map(solid_ball).collect();
     clock.lap("radii");
     let pixel = solid_balls.iter().map(|b| b.centre.z / camera.f).fold(f64::INFINITY, f64::min);
-    Grown {
-        cones: solid(&outermost(&solid_balls, pixel), eye.loops),
-        skeleton: skeleton(memory, &solid_balls),
-        boundary: boundary(camera, eye.loops, &edges),
-    }
+    let outermost = outermost(&solid_balls, pixel);
+    let cones = match options.pieces {
+        Pieces::Cones => solid(&outermost, &chains),
+        Pieces::Balls => {
+            outermost.iter().map(|b| RoundCone { centres: [b.centre; 2], radii: [b.radius; 2] }).collect()
+        }
+    };
+    Ok(Grown { cones, skeleton: skeleton(memory, &solid_balls), boundary })
 }
 
 /// The branches of the skeleton through the solid's balls.
@@ -330,11 +397,7 @@ fn skeleton(memory: &Memory<'_>, balls: &[SolidBall]) -> Curves {
 }
 
 /// The boundary in space: each contour point at its disparity.
-fn boundary(
-    camera: &RectifiedCamera,
-    loops: &[shared::stage::contour::ContourLoop],
-    edges: &[Edge],
-) -> Curves {
+fn boundary(camera: &RectifiedCamera, loops: &[ContourLoop], edges: &[Edge]) -> Curves {
     let mut curves = Curves::default();
     for l in loops {
         let first = curves.points.len() as u32;
@@ -357,10 +420,7 @@ fn grow_as_paper(camera: &RectifiedCamera, memory: &Memory<'_>) -> Grown {
     };
     let boundary = Curves { points: lift(memory.boundary_pairs), ..Curves::default() };
     let centres = lift(memory.skeleton_pairs);
-    let nearest = |c: &Point3<f64>| {
-        boundary.points.iter().map(|b| (b - c).norm_squared()).fold(f64::INFINITY, f64::min).sqrt()
-    };
-    let radii: Vec<f64> = centres.iter().map(nearest).collect();
+    let radii: Vec<f64> = centres.iter().map(|c| distance_to_points(&boundary.points, c)).collect();
     let cones = centres.iter().zip(&radii).filter(|(_, r)| r.is_finite() && **r > 0.0);
     Grown {
         cones: cones.map(|(c, r)| RoundCone { centres: [*c; 2], radii: [*r; 2] }).collect(),

@@ -48,6 +48,8 @@ pub struct Ball {
     pub weight: f64,
     /// The contour points that it touches.
     pub contacts: [usize; 2],
+    /// Its place in its chain: see [`super::solid::Chain`].
+    pub place: usize,
     /// Left ray through its centre, z = 1.
     pub ray: Vector3<f64>,
 }
@@ -103,6 +105,7 @@ pub fn balls(
             disparity: px(d.disparity),
             weight: f64::from(d.weight) / 16384.0,
             contacts,
+            place: contacts[0],
             ray: centre_ray(camera, at, rho, chord),
         }
     };
@@ -110,7 +113,12 @@ pub fn balls(
 }
 
 /// The ray to the centre of a ball whose image has its middle at `at`.
-fn centre_ray(camera: &RectifiedCamera, at: Vector2<f64>, rho: f64, chord: Vector2<f64>) -> Vector3<f64> {
+pub(super) fn centre_ray(
+    camera: &RectifiedCamera,
+    at: Vector2<f64>,
+    rho: f64,
+    chord: Vector2<f64>,
+) -> Vector3<f64> {
     let outside = rho * rho / (camera.f * camera.f + rho * rho);
     let from_axis = at - Vector2::new(camera.cx, camera.cy);
     let length = chord.norm();
@@ -129,6 +137,11 @@ fn centre_ray(camera: &RectifiedCamera, at: Vector2<f64>, rho: f64, chord: Vecto
 pub fn distance_to_rays(rays: &[Vector3<f64>], centre: &Point3<f64>) -> f64 {
     let squared = |ray: &Vector3<f64>| centre.coords.cross(ray).norm_squared();
     rays.iter().map(squared).fold(f64::INFINITY, f64::min).sqrt()
+}
+
+/// Distance from a point to the nearest of others, mm; infinite if there is none.
+pub fn distance_to_points(points: &[Point3<f64>], centre: &Point3<f64>) -> f64 {
+    points.iter().map(|p| (p - centre).norm_squared()).fold(f64::INFINITY, f64::min).sqrt()
 }
 
 /// Unit viewing rays of the left boundary, the image's border left out.

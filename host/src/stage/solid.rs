@@ -2,8 +2,9 @@
 //!
 //! The union of balls of the paper's section 4.2 has dents between neighbouring centres. The medial axis
 //! runs on between them, so the convex hull of two neighbouring balls, a round cone, belongs to the
-//! object as well. Neighbours are balls grown from neighbouring contour points whose centres lie close in
-//! the image and in depth: where the axis branches or jumps there is no cone.
+//! object as well. Neighbours are balls grown from neighbouring contour points, or next to each other on a
+//! curve, whose centres lie close in the image and in depth: where the axis branches or jumps there is no
+//! cone.
 
 //!
 //! Contour points around a round part of the object all have nearly the same ball. Those that stick out of
@@ -14,7 +15,6 @@
 
 use super::surface::RoundCone;
 use nalgebra::{Point3, Vector2};
-use shared::stage::contour::ContourLoop;
 
 /// A ball in space.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,14 +25,25 @@ pub struct SolidBall {
     pub radius: f64,
     /// Centre of its image in the left view, px.
     pub at: Vector2<f64>,
-    /// The contour point that it was grown from.
-    pub grown_from: usize,
+    /// Its place among the places of all chains.
+    pub place: usize,
+}
+
+/// A run of places whose balls follow one another: a contour loop or a curve.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Chain {
+    /// First place.
+    pub start: usize,
+    /// Number of places.
+    pub len: usize,
+    /// Whether the first place follows the last.
+    pub closed: bool,
 }
 
 /// Centres farther apart in the image are no neighbours, px.
 const NEAR_PX: f64 = 3.0;
-/// Contour points between neighbours at most: some points have no ball.
-const NEAR_POINTS: usize = 3;
+/// Places between neighbours at most: some have no ball.
+const NEAR_PLACES: usize = 3;
 
 /// How far a ball may stick out of a larger one and still be left out, as a part of a pixel there.
 const SLACK: f64 = 0.05;
@@ -57,17 +68,18 @@ pub fn outermost(balls: &[SolidBall], pixel: f64) -> Vec<SolidBall> {
     kept.into_iter().map(|i| balls[i]).collect()
 }
 
-/// The round cones of a set of balls, in the order of the contour points that they grew from.
-pub fn solid(balls: &[SolidBall], loops: &[ContourLoop]) -> Vec<RoundCone> {
+/// The round cones of a set of balls, in the order of their places.
+pub fn solid(balls: &[SolidBall], chains: &[Chain]) -> Vec<RoundCone> {
     let mut cones = Vec::with_capacity(balls.len());
-    for l in loops {
-        let from = balls.partition_point(|b| b.grown_from < l.start);
-        let to = balls.partition_point(|b| b.grown_from < l.start + l.len);
-        let ring = &balls[from..to];
-        for (k, ball) in ring.iter().enumerate() {
-            let next = &ring[(k + 1) % ring.len()];
-            let ahead = (next.grown_from + l.len - ball.grown_from) % l.len;
-            let end = if ahead <= NEAR_POINTS && joined(ball, next) { next } else { ball };
+    for chain in chains {
+        let from = balls.partition_point(|b| b.place < chain.start);
+        let to = balls.partition_point(|b| b.place < chain.start + chain.len);
+        let run = &balls[from..to];
+        for (k, ball) in run.iter().enumerate() {
+            let next = &run[(k + 1) % run.len()];
+            let ahead = (next.place + chain.len - ball.place) % chain.len;
+            let follows = ahead <= NEAR_PLACES && (chain.closed || next.place > ball.place);
+            let end = if follows && joined(ball, next) { next } else { ball };
             cones.push(RoundCone { centres: [ball.centre, end.centre], radii: [ball.radius, end.radius] });
         }
     }
