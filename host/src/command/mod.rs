@@ -1,0 +1,2 @@
+//! What the user asks for: one file a subcommand.
+
