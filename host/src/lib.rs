@@ -3,6 +3,7 @@
 //! solid, and exports and reports write it down.
 
 // What goes in.
+pub mod source;
 pub mod calibration;
 
 // What happens to it.
@@ -22,3 +23,6 @@ pub mod bvh;
 pub mod random;
 pub mod render;
 pub mod evaluate;
+
+// What a user asks for.
+pub mod command;

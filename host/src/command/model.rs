@@ -1,0 +1,78 @@
+//! One pair to one model: reconstructed, written, and told about.
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use image::GrayImage;
+use nalgebra::Vector3;
+
+use super::Failure;
+use super::table::Table;
+use crate::calibration::StereoCamera;
+use crate::export::ply;
+use crate::mesh::Mesh;
+use crate::reconstruct::{Options, Reconstruction, reconstruct};
+use crate::report::words;
+
+/// All that a model comes from.
+pub(super) struct Order<'a> {
+    pub(super) images: [GrayImage; 2],
+    pub(super) calibration: &'a StereoCamera,
+    pub(super) options: &'a Options,
+    /// Whether to draw the stages.
+    pub(super) pictures: bool,
+    /// The true surface, to be shown beside the model.
+    pub(super) truth: Option<&'a Mesh>,
+    /// Where the results go.
+    pub(super) folder: &'a Path,
+}
+
+/// What has come of it.
+pub(super) struct Model {
+    pub(super) reconstruction: Reconstruction,
+    /// As in `report.json`.
+    pub(super) report: serde_json::Value,
+    /// From images to files.
+    pub(super) time: Duration,
+}
+
+/// Reconstructs and writes.
+pub(super) fn make(order: Order<'_>) -> Result<Model, Failure> {
+    let start = Instant::now();
+    let [left, right] = order.images;
+    let reconstruction = reconstruct(left, right, order.calibration, order.options, &mut ())?;
+    std::fs::create_dir_all(order.folder)?;
+    ply::write_mesh(&order.folder.join("model.ply"), &reconstruction.mesh, &["unit mm"])?;
+    Ok(Model { reconstruction, report: serde_json::Value::Null, time: start.elapsed() })
+}
+
+impl Model {
+    /// The box around the model, mm.
+    pub(super) fn size(&self) -> Vector3<f64> {
+        self.reconstruction.mesh.bounds().map_or_else(Vector3::zeros, |[low, high]| high - low)
+    }
+
+    /// Everything that the user should know, in words.
+    pub(super) fn warnings(&self) -> Vec<String> {
+        let mut warnings: Vec<String> =
+            self.reconstruction.outcome.findings.iter().map(words::sentence).collect();
+        let (bodies, share) = self.reconstruction.dropped;
+        if bodies > 0 {
+            warnings.push(format!(
+                "{bodies} loose pieces with {:.1} % of the volume were left out",
+                100.0 * share
+            ));
+        }
+        warnings
+    }
+
+    /// Adds what people want to know to a table.
+    pub(super) fn tell(&self, table: &mut Table) {
+        let mesh = &self.reconstruction.mesh;
+        let [width, height, depth]: [f64; 3] = self.size().into();
+        let distance = mesh.bounds().map_or(0.0, |[low, high]| nalgebra::center(&low, &high).coords.norm());
+        table.row("size", &format!("{width:.1} mm wide, {height:.1} high, {depth:.1} deep"));
+        table.row("distance", &format!("{distance:.0} mm from the left camera"));
+        table.row("model", &format!("{} vertices, {} faces", mesh.vertices.len(), mesh.faces.len()));
+    }
+}
