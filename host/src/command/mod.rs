@@ -14,6 +14,7 @@
 pub mod completions;
 pub mod demo;
 pub mod evaluate;
+mod batch;
 mod model;
 pub mod options;
 pub mod render;
@@ -120,16 +121,12 @@ fn page(source: &str) -> String {
     let mut page = String::new();
     for line in source.lines().map_while(|line| line.strip_prefix("//!")) {
         let line = line.strip_prefix(' ').unwrap_or(line);
-        let flows = !line.is_empty() && !line.starts_with(' ') && !page.is_empty() && !page.ends_with('\n');
-        page.push_str(if page.is_empty() {
-            ""
-        } else if flows {
-            " "
-        } else {
-            "\n"
-        });
+        let flows = !(line.is_empty() || line.starts_with(' ') || page.is_empty() || page.ends_with('\n'));
+        page.push_str(if flows { " " } else { "" });
         page.push_str(line);
-        if line.is_empty() || line.ends_with(':') {
+        if line.is_empty() {
+            page.push_str(if page.ends_with('\n') { "\n" } else { "\n\n" });
+        } else if line.starts_with(' ') || line.ends_with(':') {
             page.push('\n');
         }
     }
@@ -149,7 +146,7 @@ mod tests {
     #[test]
     fn help_is_the_head_of_the_file() {
         let source = "//! One\n//! two.\n//!\n//! Examples:\n//!   a\n//!   b\n\nuse x;\n//! not this\n";
-        assert_eq!(page(source), "One two.\n\nExamples:\n  a\n  b");
+        assert_eq!(page(source), "One two.\n\nExamples:\n  a\n  b\n");
     }
 
     #[test]

@@ -23,17 +23,16 @@
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
-use indicatif::{ParallelProgressIterator, ProgressBar, ProgressStyle};
-use rayon::prelude::*;
+use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 
 use super::model::{self, Model, Order};
 use super::options::{CameraArgs, MethodArgs};
 use super::table::Table;
-use super::{Failure, note, say, say_json, words_of};
+use super::{Failure, batch, note, say, say_json, words_of};
 use crate::reconstruct::Options;
 use crate::source::find::{Found, find};
-use crate::source::{Layout, Pair};
+use crate::source::{Files, Layout, Pair};
 
 /// Arguments of `replay`.
 #[derive(Debug, clap::Args)]
@@ -87,9 +86,7 @@ struct Success {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let options = args.method.options()?;
     let found = find(&args.input, args.layout)?;
-    let threads = args.jobs.map_or(0, usize::from);
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
-    let done = pool.install(|| all(args, &options, &found));
+    let done = all(args, &options, &found)?;
     if args.json {
         say_json(&as_json(&done, &found))?;
     } else {
@@ -99,22 +96,26 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 }
 
 /// Every pair, in parallel; results in the order of the pairs.
-fn all<'a>(args: &Args, options: &Options, found: &'a Found) -> Vec<Done<'a>> {
-    let bar = if found.pairs.len() > 1 && std::io::stderr().is_terminal() {
-        ProgressBar::new(found.pairs.len() as u64)
+fn all<'a>(args: &Args, options: &Options, found: &'a Found) -> Result<Vec<Done<'a>>, Failure> {
+    let pairs = &found.pairs;
+    let bar = if pairs.len() > 1 && std::io::stderr().is_terminal() {
+        ProgressBar::new(pairs.len() as u64)
     } else {
         ProgressBar::hidden()
     };
     if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} pairs, {eta} left") {
         bar.set_style(style);
     }
-    let one = |pair: &'a Pair| {
+    let job = |index: usize| {
+        let pair = &pairs[index];
         let folder = if found.single { args.out.clone() } else { args.out.join(&pair.name) };
-        Done { pair, result: one(args, options, pair, &folder), folder }
+        let result = one(args, options, pair, &folder).map_err(|failure| with_guess(pair, failure));
+        bar.inc(1);
+        Done { pair, folder, result }
     };
-    let done = found.pairs.par_iter().progress_with(bar.clone()).map(one).collect();
+    let done = batch::run(pairs.len(), args.jobs.map(usize::from), &job)?;
     bar.finish_and_clear();
-    done
+    Ok(done)
 }
 
 fn one(args: &Args, options: &Options, pair: &Pair, folder: &Path) -> Result<Success, Failure> {
@@ -133,6 +134,18 @@ fn one(args: &Args, options: &Options, pair: &Pair, folder: &Path) -> Result<Suc
     })?;
     let warnings = views.warnings.into_iter().chain(model.warnings()).collect();
     Ok(Success { model, warnings, calibration: beside })
+}
+
+/// A failure, with a hint if the user may have forgotten the other image.
+fn with_guess(pair: &Pair, failure: Failure) -> Failure {
+    match pair.files {
+        Files::One(_, None) => format!(
+            "{}; one image was given and taken for both views: give two, or --layout if it was halved the wrong way",
+            words_of(&*failure)
+        )
+        .into(),
+        _ => failure,
+    }
 }
 
 fn as_text(done: &[Done<'_>], found: &Found) -> String {

@@ -106,7 +106,8 @@ pub fn find(inputs: &[String], layout: Option<Layout>) -> Result<Found, FindErro
     if let Some(files) = named {
         let (Files::Two([first, _]) | Files::One(first, _)) = &files;
         let calibration = calibration_beside(first, Path::new(""));
-        let name = first.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+        let root = first.parent().and_then(Path::parent).unwrap_or(Path::new(""));
+        let name = name(first, root, matches!(files, Files::Two(_)));
         return Ok(Found { pairs: vec![Pair { name, files, calibration }], alone: Vec::new(), single: true });
     }
     search(inputs, layout.filter(|_| one_file))
