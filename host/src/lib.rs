@@ -15,6 +15,10 @@ pub mod reconstruct;
 pub mod mesh;
 pub mod export;
 pub mod report;
+pub mod output;
+
+// What the user asks for.
+pub mod command;
 
 // What it is compared with: built-in solids, rendered and measured.
 pub mod shape;

@@ -203,7 +203,7 @@ fn grey(image: &GrayImage) -> Result<Grey<'_>, Finding> {
 }
 
 /// The core's settings for a camera.
-fn settings(camera: &RectifiedCamera, options: &Options) -> Settings {
+pub(crate) fn settings(camera: &RectifiedCamera, options: &Options) -> Settings {
     let fixed = |x: f64| (x * f64::from(PX)).round() as i32;
     let optics = Optics { focal: fixed(camera.f), disparity_offset: fixed(camera.disparity_offset()) };
     let chosen = match options.mode {

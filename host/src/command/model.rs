@@ -9,10 +9,11 @@ use nalgebra::Vector3;
 use super::Failure;
 use super::table::Table;
 use crate::calibration::StereoCamera;
-use crate::export::ply;
 use crate::mesh::Mesh;
 use crate::reconstruct::{Options, Reconstruction, reconstruct};
-use crate::report::words;
+use crate::output;
+use crate::report::record::Record;
+use crate::report::{Run, numbers, words};
 
 /// All that a model comes from.
 pub(super) struct Order<'a> {
@@ -39,11 +40,13 @@ pub(super) struct Model {
 /// Reconstructs and writes.
 pub(super) fn make(order: Order<'_>) -> Result<Model, Failure> {
     let start = Instant::now();
-    let [left, right] = order.images;
-    let reconstruction = reconstruct(left, right, order.calibration, order.options, &mut ())?;
-    std::fs::create_dir_all(order.folder)?;
-    ply::write_mesh(&order.folder.join("model.ply"), &reconstruction.mesh, &["unit mm"])?;
-    Ok(Model { reconstruction, report: serde_json::Value::Null, time: start.elapsed() })
+    let Order { images: [left, right], calibration, options, truth, .. } = order;
+    let mut record = if order.pictures { Record::new() } else { Record::figures_only() };
+    let reconstruction = reconstruct(left, right, calibration, options, &mut record)?;
+    let run = Run { calibration, options, reconstruction: &reconstruction, record: &record, truth };
+    output::write(order.folder, &run)?;
+    let report = serde_json::from_slice(&numbers::json(&run))?;
+    Ok(Model { reconstruction, report, time: start.elapsed() })
 }
 
 impl Model {

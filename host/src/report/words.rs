@@ -1,14 +1,102 @@
-//! Findings of the core in words: what is wrong and what to do.
+//! Words for people and for machines: findings as sentences that say what is wrong and what to do, and
+//! the names by which choices are given and reported.
 
 use crate::stage::balls::px;
 use shared::fixed::ONE;
 use shared::pipeline::{Finding, Side};
+use shared::stage::binarise::{Polarity, Threshold};
+use shared::stage::thinning::Rule;
+
+/// Thinning rules by name.
+pub const RULES: [(&str, Rule); 4] = [
+    ("edt", Rule::EdtOrdered),
+    ("hit-or-miss", Rule::HitOrMiss),
+    ("zhang-suen", Rule::ZhangSuen),
+    ("guo-hall", Rule::GuoHall),
+];
+
+/// Polarities by name.
+pub const POLARITIES: [(&str, Polarity); 3] =
+    [("bright", Polarity::BrightObject), ("dark", Polarity::DarkObject), ("auto", Polarity::Auto)];
+
+/// The name of a thinning rule.
+#[must_use]
+pub fn rule_name(rule: Rule) -> &'static str {
+    name_in(&RULES, rule)
+}
+
+/// The name of a polarity.
+#[must_use]
+pub fn polarity_name(polarity: Polarity) -> &'static str {
+    name_in(&POLARITIES, polarity)
+}
+
+/// The thinning rule of a name.
+///
+/// # Errors
+/// A sentence with the names there are.
+pub fn parse_rule(name: &str) -> Result<Rule, String> {
+    parse(&RULES, name)
+}
+
+/// The polarity of a name.
+///
+/// # Errors
+/// A sentence with the names there are.
+pub fn parse_polarity(name: &str) -> Result<Polarity, String> {
+    parse(&POLARITIES, name)
+}
+
+/// `otsu`, or a grey level.
+///
+/// # Errors
+/// A sentence that says so.
+pub fn parse_threshold(text: &str) -> Result<Threshold, String> {
+    if text == "otsu" {
+        return Ok(Threshold::Otsu);
+    }
+    text.parse().map(Threshold::Fixed).map_err(|_| "give a grey level from 0 to 255, or otsu".into())
+}
+
+fn name_in<T: PartialEq>(names: &[(&'static str, T)], value: T) -> &'static str {
+    names.iter().find(|(_, other)| *other == value).map_or("", |(name, _)| name)
+}
+
+fn parse<T: Copy>(names: &[(&'static str, T)], text: &str) -> Result<T, String> {
+    let known = || names.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+    let found = names.iter().find(|(name, _)| *name == text);
+    found.map(|(_, value)| *value).ok_or_else(|| format!("one of: {}", known()))
+}
+
+/// The name of a finding for programs; it does not change between versions.
+#[must_use]
+pub const fn name(finding: &Finding) -> &'static str {
+    match finding {
+        Finding::SizesDiffer { .. } => "sizes-differ",
+        Finding::NoObject(..) => "no-object",
+        Finding::FillsImage(..) => "fills-image",
+        Finding::SecondObject(..) => "second-object",
+        Finding::AreasDiffer(_) => "areas-differ",
+        Finding::TouchesBorder(_) => "touches-border",
+        Finding::TooLow(..) => "too-low",
+        Finding::FlatHull => "flat-hull",
+        Finding::Ambiguous(_) => "ambiguous",
+        Finding::NotAffine(_) => "not-affine",
+        Finding::SwappedEyes(_) => "swapped-eyes",
+        Finding::NotRectified { .. } => "not-rectified",
+        Finding::Unmatched(_) => "unmatched",
+        Finding::NoMap => "no-map",
+        Finding::Capacity(_) => "capacity",
+    }
+}
 
 fn percent(x: i32) -> f64 {
     f64::from(x) * 100.0 / f64::from(ONE)
 }
 
-fn view(side: &Side) -> &'static str {
+/// The name of an eye.
+#[must_use]
+pub const fn view(side: &Side) -> &'static str {
     match side {
         Side::Left => "left",
         Side::Right => "right",

@@ -1,0 +1,153 @@
+//! The folder that a reconstruction leaves.
+//!
+//! | file | what |
+//! |---|---|
+//! | `model.ply` | the solid's closed surface |
+//! | `skeleton.ply` | its curve skeleton: points with `radius`, mm, and edges |
+//! | `boundary.ply` | its boundary as seen from the left: points and edges |
+//! | `report.json` | every figure ([`crate::report::numbers`]) |
+//! | `pictures/*.png` | a picture a stage ([`pictures::NAMES`]), if the record kept rasters |
+//!
+//! Lengths are millimetres in the left camera's axes. Everything is made in a temporary folder inside the
+//! target and moved only when all of it is complete; when something fails before that, the target is left
+//! as it was. Pictures of an earlier run that this one did not draw are removed, so that a folder speaks of
+//! one run; files of other names are not touched.
+
+use crate::export::ExportError;
+use crate::export::ply::{self, Points};
+use crate::reconstruct::{Curves, Reconstruction};
+use crate::report::{Run, numbers, pictures};
+use image::RgbImage;
+use std::io::{self, Cursor};
+use std::path::{Path, PathBuf};
+
+/// Sub-folder of the pictures.
+const PICTURES: &str = "pictures";
+
+/// Write all files of a run into `folder`, which is created if it is missing.
+///
+/// # Errors
+/// [`ExportError`] with the file or folder that could not be written.
+pub fn write(folder: &Path, run: &Run<'_>) -> Result<(), ExportError> {
+    let created = create(folder)?;
+    let result = write_into(folder, run);
+    if result.is_err() {
+        for folder in created.iter().rev() {
+            // What still holds files stays: then it is no longer ours alone.
+            let _ = std::fs::remove_dir(folder);
+        }
+    }
+    result
+}
+
+/// Create a folder and its parents; returns those that were missing, outermost first.
+fn create(folder: &Path) -> Result<Vec<PathBuf>, ExportError> {
+    let missing = |f: &&Path| !f.as_os_str().is_empty() && !f.exists();
+    let mut created: Vec<PathBuf> = folder.ancestors().take_while(missing).map(Path::to_path_buf).collect();
+    created.reverse();
+    std::fs::create_dir_all(folder).map_err(|source| failed(folder, source))?;
+    Ok(created)
+}
+
+fn failed(path: &Path, source: io::Error) -> ExportError {
+    ExportError::Io { path: path.to_path_buf(), source }
+}
+
+fn write_into(folder: &Path, run: &Run<'_>) -> Result<(), ExportError> {
+    let staged = tempfile::Builder::new()
+        .prefix(".unfinished-")
+        .tempdir_in(folder)
+        .map_err(|source| failed(folder, source))?;
+    let stage = Stage { folder, staged: staged.path() };
+    let mut names = stage.models(run.reconstruction)?;
+    names.push(stage.bytes("report.json", &numbers::json(run))?);
+    let drawn = pictures::draw(run);
+    if !drawn.is_empty() {
+        let pictures = stage.staged.join(PICTURES);
+        std::fs::create_dir(&pictures).map_err(|source| failed(&folder.join(PICTURES), source))?;
+    }
+    for (name, picture) in &drawn {
+        names.push(stage.picture(&format!("{PICTURES}/{name}"), picture)?);
+    }
+    stage.finish(&names)
+}
+
+/// Files on their way into a folder.
+struct Stage<'a> {
+    folder: &'a Path,
+    staged: &'a Path,
+}
+
+impl Stage<'_> {
+    /// The surface, the skeleton and the boundary.
+    fn models(&self, made: &Reconstruction) -> Result<Vec<String>, ExportError> {
+        let comments = ["Ossature", "unit mm", "axes of the left camera: x right, y down, z forward"];
+        self.named("model.ply", |path| ply::write_mesh(path, &made.mesh, &comments))?;
+        for (name, curves) in [("skeleton.ply", &made.skeleton), ("boundary.ply", &made.boundary)] {
+            self.named(name, |path| write_curves(path, curves, &comments))?;
+        }
+        Ok(["model.ply", "skeleton.ply", "boundary.ply"].map(String::from).to_vec())
+    }
+
+    /// Writes under the temporary path, and names the final one when that fails.
+    fn named(
+        &self,
+        name: &str,
+        write: impl FnOnce(&Path) -> Result<(), ExportError>,
+    ) -> Result<(), ExportError> {
+        let path = self.folder.join(name);
+        write(&self.staged.join(name)).map_err(|error| match error {
+            ExportError::Io { source, .. } => ExportError::Io { path, source },
+            ExportError::Content { what, .. } => ExportError::Content { path, what },
+        })
+    }
+
+    fn bytes(&self, name: &str, bytes: &[u8]) -> Result<String, ExportError> {
+        let written = std::fs::write(self.staged.join(name), bytes);
+        written.map_err(|source| failed(&self.folder.join(name), source))?;
+        Ok(name.to_owned())
+    }
+
+    fn picture(&self, name: &str, picture: &RgbImage) -> Result<String, ExportError> {
+        let mut bytes = Vec::new();
+        picture
+            .write_to(&mut Cursor::new(&mut bytes), image::ImageFormat::Png)
+            .map_err(|error| failed(&self.folder.join(name), io::Error::other(error)))?;
+        self.bytes(name, &bytes)
+    }
+
+    /// Moves the files to their final names, and removes pictures that are no longer true.
+    fn finish(&self, names: &[String]) -> Result<(), ExportError> {
+        for name in names {
+            let path = self.folder.join(name);
+            if path.is_dir() {
+                return Err(failed(&path, io::Error::other("a folder of that name is in the way")));
+            }
+        }
+        let pictures = self.folder.join(PICTURES);
+        if self.staged.join(PICTURES).exists() {
+            std::fs::create_dir_all(&pictures).map_err(|source| failed(&pictures, source))?;
+        }
+        for name in names {
+            let path = self.folder.join(name);
+            std::fs::rename(self.staged.join(name), &path).map_err(|source| failed(&path, source))?;
+        }
+        for name in pictures::NAMES.iter().map(|name| format!("{PICTURES}/{name}")) {
+            let path = self.folder.join(&name);
+            if !names.contains(&name) && path.is_file() {
+                std::fs::remove_file(&path).map_err(|source| failed(&path, source))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn write_curves(path: &Path, curves: &Curves, comments: &[&str]) -> Result<(), ExportError> {
+    let radius = [("radius", &curves.radii[..])];
+    let points = Points {
+        positions: &curves.points,
+        scalars: if curves.radii.is_empty() { &[] } else { &radius },
+        edges: &curves.edges,
+    };
+    ply::write_points(path, &points, comments)
+}

@@ -1,0 +1,86 @@
+//! What one eye's picture gave, in figures.
+
+use super::super::record::Parts;
+use crate::stage::balls::px;
+use serde::Serialize;
+use shared::stage::binarise::Tone;
+use shared::stage::contour::ContourLoop;
+use shared::stage::distance::DISTANCE_PX;
+use shared::stage::graph::NodeKind;
+
+/// The figures of an eye.
+#[derive(Serialize)]
+pub(super) struct EyeFigures {
+    /// Grey values above it are bright.
+    threshold_grey: u8,
+    /// `bright` or `dark`: the object's side of the threshold.
+    tone: Option<&'static str>,
+    area_px2: usize,
+    /// First column and row of the object.
+    first_px: Option<[u16; 2]>,
+    /// Last column and row of the object.
+    last_px: Option<[u16; 2]>,
+    components: u32,
+    largest_component_px2: u32,
+    second_component_px2: u32,
+    boundary_px: usize,
+    contour_points: usize,
+    contour_loops: usize,
+    contour_length_px: f64,
+    /// Radius of the largest disc about a pixel.
+    widest_px: f64,
+    thinning_cycles: u32,
+    thinning_deleted_px: u32,
+    edges_before_pruning: usize,
+    edges: usize,
+    branches_pruned: usize,
+    pixels_pruned: usize,
+    ends: usize,
+    junctions: usize,
+    isolated: usize,
+    rings: usize,
+    hull_vertices: usize,
+    control_points: usize,
+}
+
+impl EyeFigures {
+    pub(super) fn of(eye: &Parts) -> Self {
+        let nodes = |kind| eye.nodes.iter().filter(|n| n.kind == kind).count();
+        Self {
+            threshold_grey: eye.level,
+            tone: eye.tone.map(|tone| match tone {
+                Tone::Bright => "bright",
+                Tone::Dark => "dark",
+            }),
+            area_px2: eye.area,
+            first_px: eye.bounds.map(|b| [b.min.u, b.min.v]),
+            last_px: eye.bounds.map(|b| [b.max.u, b.max.v]),
+            components: eye.components.count,
+            largest_component_px2: eye.components.largest,
+            second_component_px2: eye.components.second,
+            boundary_px: eye.boundary,
+            contour_points: eye.contour.len(),
+            contour_loops: eye.loops.len(),
+            contour_length_px: eye.loops.iter().map(|l| length(eye, *l)).sum(),
+            widest_px: f64::from(eye.widest) / f64::from(DISTANCE_PX),
+            thinning_cycles: eye.thinning.cycles,
+            thinning_deleted_px: eye.thinning.deleted,
+            edges_before_pruning: eye.pruning.edges_before,
+            edges: eye.pruning.edges_after,
+            branches_pruned: eye.pruning.branches_removed,
+            pixels_pruned: eye.pruning.pixels_removed,
+            ends: nodes(NodeKind::End),
+            junctions: nodes(NodeKind::Junction),
+            isolated: nodes(NodeKind::Isolated),
+            rings: nodes(NodeKind::Loop),
+            hull_vertices: eye.hull.len(),
+            control_points: eye.controls.len(),
+        }
+    }
+}
+
+/// Length of a loop of the contour, px.
+fn length(eye: &Parts, l: ContourLoop) -> f64 {
+    let step = |i: usize| px(eye.contour[i].at.distance(eye.contour[l.step(i, 1)].at));
+    l.range().map(step).sum()
+}
