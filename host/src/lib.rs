@@ -27,6 +27,3 @@ pub mod bvh;
 pub mod random;
 pub mod render;
 pub mod evaluate;
-
-// What a user asks for.
-pub mod command;

@@ -19,6 +19,7 @@ mod model;
 pub mod options;
 pub mod render;
 pub mod replay;
+mod scene;
 mod table;
 
 use std::error::Error;

@@ -10,8 +10,8 @@ use super::Failure;
 use super::table::Table;
 use crate::calibration::StereoCamera;
 use crate::mesh::Mesh;
-use crate::reconstruct::{Options, Reconstruction, reconstruct};
 use crate::output;
+use crate::reconstruct::{Options, Reconstruction, reconstruct};
 use crate::report::record::Record;
 use crate::report::{Run, numbers, words};
 

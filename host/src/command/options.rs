@@ -160,3 +160,13 @@ fn threshold(text: &str) -> Result<binarise::Threshold, String> {
         _ => text.parse().map(binarise::Threshold::Fixed).map_err(|_| "must be otsu or 0 to 255".into()),
     }
 }
+
+/// A number of things in words.
+pub(super) fn count(number: usize, one: &str, many: &str) -> String {
+    format!("{number} {}", if number == 1 { one } else { many })
+}
+
+/// A share of one as a percentage.
+pub(super) fn percent(share: f64) -> String {
+    format!("{:.2} %", 100.0 * share)
+}
