@@ -12,6 +12,7 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
+use nalgebra::Vector3;
 use serde_json::json;
 
 use super::model::{self, Model, Order};
@@ -68,7 +69,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             "shape": shape.name(),
             "folder": folder,
             "size_mm": <[f64; 3]>::from(model.size()),
-            "true_size_mm": true_size(&scene),
+            "size_error_mm": size_error(&model, &scene),
             "warnings": model.warnings(),
             "evaluation": found,
             "report": model.report,
@@ -76,8 +77,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
     let mut table = Table::new(shape.name());
     model.tell(&mut table);
-    let [width, height, depth] = true_size(&scene);
-    table.row("true size", &format!("{width:.1} mm wide, {height:.1} high, {depth:.1} deep"));
+    let [width, height, depth] = size_error(&model, &scene);
+    table.row("size error", &format!("{width:+.1} mm wide, {height:+.1} high, {depth:+.1} deep"));
     evaluate::tell(&found, &mut table);
     for warning in model.warnings() {
         table.row("warning", &warning);
@@ -97,11 +98,13 @@ fn measure(model: &Model, scene: &Scene) -> Evaluation {
     crate::evaluate::evaluate(&model.reconstruction.mesh, &scene.truth, &views, &options)
 }
 
-fn true_size(scene: &Scene) -> [f64; 3] {
-    scene.truth.bounds().map_or([0.0; 3], |[low, high]| (high - low).into())
+/// By how much the box around the model is larger than that around the shape, mm.
+fn size_error(model: &Model, scene: &Scene) -> [f64; 3] {
+    let truth = scene.truth.bounds().map_or_else(Vector3::zeros, |[low, high]| high - low);
+    (model.size() - truth).into()
 }
 
-/// The parser's own message lists what is left of `UnknownShape`.
+/// The error as text, which is what the parser shows.
 fn shape(name: &str) -> Result<Shape, String> {
     name.parse().map_err(|unknown: crate::shape::UnknownShape| unknown.to_string())
 }
