@@ -11,8 +11,7 @@
 
 use std::path::PathBuf;
 
-use super::options::{count, percent};
-use super::table::Table;
+use super::table::{Table, count, percent};
 use super::{Failure, say, say_json};
 use crate::calibration::StereoCamera;
 use crate::evaluate::{Evaluation, Options, evaluate};

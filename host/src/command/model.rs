@@ -7,7 +7,7 @@ use image::GrayImage;
 use nalgebra::Vector3;
 
 use super::Failure;
-use super::table::Table;
+use super::table::{Table, count, percent, sides};
 use crate::calibration::StereoCamera;
 use crate::mesh::Mesh;
 use crate::output;
@@ -61,10 +61,8 @@ impl Model {
             self.reconstruction.outcome.findings.iter().map(words::sentence).collect();
         let (bodies, share) = self.reconstruction.dropped;
         if bodies > 0 {
-            warnings.push(format!(
-                "{bodies} loose pieces with {:.1} % of the volume were left out",
-                100.0 * share
-            ));
+            let pieces = count(bodies, "loose piece", "loose pieces");
+            warnings.push(format!("{pieces} with {} of the volume left out", percent(share)));
         }
         warnings
     }
@@ -72,9 +70,8 @@ impl Model {
     /// Adds what people want to know to a table.
     pub(super) fn tell(&self, table: &mut Table) {
         let mesh = &self.reconstruction.mesh;
-        let [width, height, depth]: [f64; 3] = self.size().into();
         let distance = mesh.bounds().map_or(0.0, |[low, high]| nalgebra::center(&low, &high).coords.norm());
-        table.row("size", &format!("{width:.1} mm wide, {height:.1} high, {depth:.1} deep"));
+        table.row("size", &sides(self.size()));
         table.row("distance", &format!("{distance:.0} mm from the left camera"));
         table.row("model", &format!("{} vertices, {} faces", mesh.vertices.len(), mesh.faces.len()));
     }

@@ -5,12 +5,13 @@ use std::path::PathBuf;
 use clap::error::ErrorKind;
 use clap::{CommandFactory, ValueEnum};
 use image::GrayImage;
-use shared::stage::binarise;
+use shared::stage::binarise::{Polarity, Threshold};
 use shared::stage::thinning::Rule;
 
 use super::{Cli, Failure};
 use crate::calibration::StereoCamera;
 use crate::reconstruct::{self, Options};
+use crate::report::words::{parse_polarity, parse_rule, parse_threshold};
 use crate::source::Pair;
 
 /// How the solid is found.
@@ -29,21 +30,15 @@ pub struct MethodArgs {
     /// Consecutive quadruplets of hull vertices compared, with --mode paper [default: 3]
     #[arg(long, value_parser = clap::value_parser!(u8).range(1..=3), value_name = "1|2|3")]
     omega: Option<u8>,
-    /// Grey level between object and background: otsu, or 0 to 255
-    #[arg(long, value_parser = threshold, default_value = "otsu", value_name = "otsu|N")]
-    threshold: binarise::Threshold,
+    /// Grey level between object and background
+    #[arg(long, value_parser = parse_threshold, default_value = "otsu", value_name = "otsu|N")]
+    threshold: Threshold,
     /// Whether the object is brighter or darker than the background
-    #[arg(
-        long,
-        value_enum,
-        default_value = "bright",
-        hide_possible_values = true,
-        value_name = "bright|dark|auto"
-    )]
+    #[arg(long, value_parser = parse_polarity, default_value = "bright", value_name = "bright|dark|auto")]
     polarity: Polarity,
     /// How the outline is thinned [default: edt, or hit-or-miss with --mode paper]
-    #[arg(long, value_enum)]
-    thinning: Option<Thinning>,
+    #[arg(long, value_parser = parse_rule, value_name = "edt|hit-or-miss|zhang-suen|guo-hall")]
+    thinning: Option<Rule>,
     /// Edge length of the model's mesh, mm [default: two pixels at the object]
     #[arg(long, value_parser = positive, value_name = "MM")]
     resolution: Option<f64>,
@@ -53,21 +48,6 @@ pub struct MethodArgs {
 enum Mode {
     Default,
     Paper,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Polarity {
-    Bright,
-    Dark,
-    Auto,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Thinning {
-    Edt,
-    HitOrMiss,
-    ZhangSuen,
-    GuoHall,
 }
 
 impl MethodArgs {
@@ -82,18 +62,8 @@ impl MethodArgs {
             (Mode::Paper, omega) => reconstruct::Mode::Paper { omega: usize::from(omega.unwrap_or(3)) },
             (Mode::Default, Some(_)) => return Err(usage("--omega belongs to --mode paper")),
         };
-        let thinning = self.thinning.map(|thinning| match thinning {
-            Thinning::Edt => Rule::EdtOrdered,
-            Thinning::HitOrMiss => Rule::HitOrMiss,
-            Thinning::ZhangSuen => Rule::ZhangSuen,
-            Thinning::GuoHall => Rule::GuoHall,
-        });
-        let polarity = match self.polarity {
-            Polarity::Bright => binarise::Polarity::BrightObject,
-            Polarity::Dark => binarise::Polarity::DarkObject,
-            Polarity::Auto => binarise::Polarity::Auto,
-        };
-        Ok(Options { mode, thinning, threshold: self.threshold, polarity, cell: self.resolution })
+        let (thinning, threshold, polarity) = (self.thinning, self.threshold, self.polarity);
+        Ok(Options { mode, thinning, threshold, polarity, cell: self.resolution })
     }
 }
 
@@ -152,21 +122,4 @@ pub(super) fn positive(text: &str) -> Result<f64, String> {
         Ok(number) if number.is_finite() && number > 0.0 => Ok(number),
         _ => Err("must be a positive number".into()),
     }
-}
-
-fn threshold(text: &str) -> Result<binarise::Threshold, String> {
-    match text {
-        "otsu" => Ok(binarise::Threshold::Otsu),
-        _ => text.parse().map(binarise::Threshold::Fixed).map_err(|_| "must be otsu or 0 to 255".into()),
-    }
-}
-
-/// A number of things in words.
-pub(super) fn count(number: usize, one: &str, many: &str) -> String {
-    format!("{number} {}", if number == 1 { one } else { many })
-}
-
-/// A share of one as a percentage.
-pub(super) fn percent(share: f64) -> String {
-    format!("{:.2} %", 100.0 * share)
 }

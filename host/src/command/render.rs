@@ -21,7 +21,7 @@ use nalgebra::Point3;
 
 use super::options::positive;
 use super::scene::{Scene, write};
-use super::table::Table;
+use super::table::{Table, sides};
 use super::{Failure, note, say};
 use crate::calibration::StereoCamera;
 use crate::mesh::Mesh;
@@ -105,20 +105,14 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         }
     }
     let mut scene = Scene::new(mesh, calibration);
-    for (image, seed) in
-        scene.images.iter_mut().zip([2 * u128::from(args.seed), 2 * u128::from(args.seed) + 1])
-    {
-        // Pairs of seeds wrap around together.
-        let noise = Noise { sigma: args.noise, salt_and_pepper: args.salt_and_pepper, seed: seed as u64 };
-        if noise.sigma > 0.0 || noise.salt_and_pepper > 0.0 {
-            noise.apply(image);
-        }
+    for (eye, image) in (0..).zip(&mut scene.images) {
+        let seed = args.seed.wrapping_mul(2).wrapping_add(eye);
+        Noise { sigma: args.noise, salt_and_pepper: args.salt_and_pepper, seed }.apply(image);
     }
     write(&args.out, &scene)?;
     let mut table = Table::new(&args.what);
     if let Some([low, high]) = scene.truth.bounds() {
-        let [width, height, depth]: [f64; 3] = (high - low).into();
-        table.row("size", &format!("{width:.1} mm wide, {height:.1} high, {depth:.1} deep"));
+        table.row("size", &sides(high - low));
     }
     table.row("files", &args.out.display().to_string());
     say(table.text())

@@ -2,6 +2,8 @@
 
 use std::fmt::Write;
 
+use nalgebra::Vector3;
+
 /// Width of the names.
 const NAMES: usize = 12;
 
@@ -25,4 +27,19 @@ impl Table {
     pub(super) fn text(&self) -> &str {
         &self.0
     }
+}
+
+/// A number of things in words.
+pub(super) fn count(number: usize, one: &str, many: &str) -> String {
+    format!("{number} {}", if number == 1 { one } else { many })
+}
+
+/// A share of one as a percentage.
+pub(super) fn percent(share: f64) -> String {
+    format!("{:.2} %", 100.0 * share)
+}
+
+/// The sides of a box, mm.
+pub(super) fn sides(size: Vector3<f64>) -> String {
+    format!("{:.1} mm wide, {:.1} high, {:.1} deep", size.x, size.y, size.z)
 }

@@ -6,19 +6,17 @@
 //! | one file | both views in it |
 //! | folders, patterns, more files | every file whose name says left and whose partner exists |
 //!
-//! A name says left or right by `left`/`right` (`left_0007`, `0007_left`, `left07`), by `im0`/`im1`
-//! (Middlebury), or by its folder: `left`/`right`, or `cam0/data`/`cam1/data` (EuRoC, where names are time
-//! stamps and partners have the same one). With a layout of one file a pair, every image is a pair.
-//!
-//! Pairs come in the order of their paths. Folders that hold a `report.json` below the one named are
+//! How a name says left or right, [`super::names`] knows. With a layout of one file a pair, every
+//! image is a pair. Pairs come in the order of their paths. Folders that hold a `report.json` below the one named are
 //! results, not input; hidden ones are passed over.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsStr;
 use std::fs;
 use std::io;
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
+use super::names::{Partner, name, partner};
 use super::{Files, Layout, Pair};
 
 /// Folders below the one named that are looked into.
@@ -27,8 +25,6 @@ const MAX_DEPTH: usize = 5;
 const CALIBRATIONS: [&str; 3] = ["calib.yaml", "calib.yml", "camchain.yaml"];
 /// Extensions of images.
 const IMAGES: [&str; 9] = ["png", "jpg", "jpeg", "pgm", "ppm", "pnm", "bmp", "tif", "tiff"];
-/// Words for the two eyes.
-const EYES: [[&str; 2]; 3] = [["left", "right"], ["im0", "im1"], ["cam0", "cam1"]];
 
 /// Why there are no pairs.
 #[derive(Debug, thiserror::Error)]
@@ -188,107 +184,6 @@ fn list(folder: &Path, root: &Path, depth: usize, into: &mut Vec<Candidate>) -> 
 fn is_image(path: &Path) -> bool {
     let extension = path.extension().and_then(OsStr::to_str).map(str::to_ascii_lowercase);
     extension.is_some_and(|extension| IMAGES.contains(&extension.as_str()))
-}
-
-/// What goes with an image.
-#[derive(Debug, PartialEq, Eq)]
-enum Partner {
-    /// Its name says neither left nor right.
-    None,
-    /// The other eye's file is not there.
-    Missing,
-    /// Left and right.
-    Pair([PathBuf; 2]),
-}
-
-fn partner(path: &Path) -> Partner {
-    let by_file = mirrored_file(path);
-    let by_folder = mirrored_folder(path);
-    let by_both = by_file.as_ref().and_then(|(eye, other)| {
-        let (of_folder, both) = mirrored_folder(other)?;
-        (*eye == of_folder).then_some((*eye, both))
-    });
-    let candidates = [by_file, by_both, by_folder];
-    let mut any = false;
-    for (eye, other) in candidates.into_iter().flatten() {
-        any = true;
-        if other.is_file() {
-            let pair = if eye == 0 { [path.into(), other] } else { [other, path.into()] };
-            return Partner::Pair(pair);
-        }
-    }
-    if any { Partner::Missing } else { Partner::None }
-}
-
-/// Which eye a file's name says it is, and the path of the other eye's file.
-fn mirrored_file(path: &Path) -> Option<(usize, PathBuf)> {
-    let stem = path.file_stem()?.to_str()?;
-    let (eye, before, after) = eye_in(stem)?;
-    let word = &stem[before.len()..stem.len() - after.len()];
-    let extension = path.extension()?.to_str()?;
-    Some((eye, path.with_file_name(format!("{before}{}{after}.{extension}", opposite(word)?))))
-}
-
-/// Which eye a file's folder says it is, or the one around a folder `data`, and the other eye's path.
-fn mirrored_folder(path: &Path) -> Option<(usize, PathBuf)> {
-    let folder = path.parent()?;
-    let inner = if folder.file_name()? == "data" { folder.parent()? } else { folder };
-    let word = inner.file_name()?.to_str()?;
-    let (eye, "", "") = eye_in(word)? else { return None };
-    let rest = path.strip_prefix(inner).ok()?;
-    Some((eye, inner.with_file_name(opposite(word)?).join(rest)))
-}
-
-/// The eye that a name speaks of, and what stands before and after the word.
-fn eye_in(name: &str) -> Option<(usize, &str, &str)> {
-    EYES.iter().flat_map(|words| words.iter().enumerate()).find_map(|(eye, word)| {
-        if name == *word {
-            return Some((eye, "", ""));
-        }
-        // `left01`, `left_scene`, `scene_left`: apart from other letters, and `im0` from other digits.
-        let apart = |c: Option<char>| c.is_none_or(|c| matches!(c, '_' | '-' | '.' | ' '));
-        let ends_in_digit = word.ends_with(|c: char| c.is_ascii_digit());
-        if let Some(after) = name.strip_prefix(word)
-            && (apart(after.chars().next())
-                || !ends_in_digit && after.bytes().all(|byte| byte.is_ascii_digit()))
-        {
-            return Some((eye, "", after));
-        }
-        let before = name.strip_suffix(word)?;
-        apart(before.chars().next_back()).then_some((eye, before, ""))
-    })
-}
-
-fn opposite(word: &str) -> Option<&'static str> {
-    EYES.iter().find_map(|[left, right]| match word {
-        _ if word == *left => Some(*right),
-        _ if word == *right => Some(*left),
-        _ => None,
-    })
-}
-
-/// A name for the results: the path below the folder named, without the words for the eye.
-fn name(file: &Path, root: &Path, is_pair: bool) -> String {
-    let below = file.strip_prefix(root).unwrap_or(file);
-    let stem = below.file_stem().and_then(OsStr::to_str).unwrap_or_default();
-    let folders = below.parent().into_iter().flat_map(Path::components);
-    let mut parts: Vec<&str> = folders
-        .filter_map(|part| if let Component::Normal(name) = part { name.to_str() } else { None })
-        .filter(|folder| !is_pair || *folder != "data" && opposite(folder).is_none())
-        .collect();
-    let own = match eye_in(stem).filter(|_| is_pair) {
-        Some((_, before, after)) => format!("{before}{after}"),
-        None => stem.to_owned(),
-    };
-    let own = own.trim_matches(['_', '-', '.', ' ']);
-    if !own.is_empty() {
-        parts.push(own);
-    }
-    match root.file_name().and_then(OsStr::to_str) {
-        Some(folder) if parts.is_empty() => folder.to_owned(),
-        _ if parts.is_empty() => "pair".to_owned(),
-        _ => parts.join("/"),
-    }
 }
 
 /// Numbers the names that occur again.

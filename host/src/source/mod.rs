@@ -4,6 +4,7 @@
 //! grey images of each ([`Pair::load`]). A pair is two files, or one that holds both views ([`Layout`]).
 
 pub mod find;
+mod names;
 pub mod picture;
 
 use std::path::{Path, PathBuf};
