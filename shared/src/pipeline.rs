@@ -177,7 +177,7 @@ const UNMATCHED_REFUSES: i32 = ONE / 4;
 /// Mean distance of the hull's vertices from the disparity plane that refuses, 1/256 px.
 const MAX_RESIDUAL: i32 = 5 * PX;
 /// The paper's reduced hulls have at most this many vertices: n^3 triples are looked at.
-const PAPER_VERTICES: usize = 24;
+pub const PAPER_VERTICES: usize = 24;
 
 impl Finding {
     /// Whether no trustworthy model can come of it.

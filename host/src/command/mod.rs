@@ -14,6 +14,7 @@
 pub mod completions;
 pub mod demo;
 pub mod evaluate;
+pub mod inspect;
 mod batch;
 mod model;
 pub mod options;
@@ -58,6 +59,9 @@ enum Command {
     /// How far a model is from the truth
     #[command(long_about = page(include_str!("evaluate.rs")))]
     Evaluate(evaluate::Args),
+    /// One stage of one view, drawn and timed
+    #[command(long_about = page(include_str!("inspect.rs")))]
+    Inspect(inspect::Args),
     /// Completions for a shell
     #[command(long_about = page(include_str!("completions.rs")))]
     Completions(completions::Args),
@@ -75,6 +79,7 @@ impl Cli {
             Command::Demo(args) => demo::run(args),
             Command::Render(args) => render::run(args),
             Command::Evaluate(args) => evaluate::run(args),
+            Command::Inspect(args) => inspect::run(args),
             Command::Completions(args) => completions::run(args),
         }
     }

@@ -6,8 +6,9 @@
 //! | one file | both views in it |
 //! | folders, patterns, more files | every file whose name says left and whose partner exists |
 //!
-//! How a name says left or right, [`super::names`] knows. With a layout of one file a pair, every
-//! image is a pair. Pairs come in the order of their paths. Folders that hold a `report.json` below the one named are
+//! How names say left and right is in `names.rs`. With a layout of one file a pair, every image is a pair.
+//!
+//! Pairs come in the order of their paths. Folders that hold a `report.json` below the one named are
 //! results, not input; hidden ones are passed over.
 
 use std::collections::{BTreeMap, BTreeSet};

@@ -1,13 +1,61 @@
-//! Pictures of what each stage made.
+//! Pictures of what each stage made, for people: a sheet a stage, both views side by side, cropped to the
+//! object and enlarged by a whole number, so that pixels stay to be seen.
+
+mod canvas;
+mod colour;
+pub(crate) mod eye;
+mod model;
+mod pair;
+mod panel;
 
 use super::Run;
+use crate::reconstruct::Mode;
+use eye::Seen;
 use image::RgbImage;
+use shared::pipeline::Side;
+
+use super::words::view;
 
 /// File names of all pictures that a run may have, in the order of the stages.
-pub const NAMES: [&str; 0] = [];
+pub const NAMES: [&str; 9] = [
+    "1-mask.png",
+    "2-contour.png",
+    "3-distance.png",
+    "4-skeleton.png",
+    "5-hull.png",
+    "6-invariants.png",
+    "7-correspondence.png",
+    "8-curves.png",
+    "model.png",
+];
 
 /// The pictures of a run with their file names; none without rasters.
 #[must_use]
-pub fn draw(_: &Run<'_>) -> Vec<(&'static str, RgbImage)> {
-    Vec::new()
+pub fn draw(run: &Run<'_>) -> Vec<(&'static str, RgbImage)> {
+    let [left, right] = &run.record.eyes;
+    let (Some(left_rasters), Some(right_rasters)) = (&left.rasters, &right.rasters) else {
+        return Vec::new();
+    };
+    let views = [
+        Seen { name: view(&Side::Left), parts: &left.parts, rasters: left_rasters },
+        Seen { name: view(&Side::Right), parts: &right.parts, rasters: right_rasters },
+    ];
+    let pair = &run.record.pair;
+    let (offset, omega) = match run.options.mode {
+        Mode::Default => (run.reconstruction.outcome.vertical_offset, 0),
+        // The paper's stages take rows as they are.
+        Mode::Paper { omega } => (0, omega),
+    };
+    let drawn = [
+        eye::mask(&views),
+        eye::contour(&views),
+        eye::distance(&views),
+        eye::skeleton(&views),
+        pair::hulls(&views, pair, offset),
+        pair::invariants(&views, pair, omega),
+        pair::correspondence(&views, pair, offset),
+        eye::curves(&views),
+        model::model(left, &run.reconstruction.mesh, run.truth),
+    ];
+    NAMES.into_iter().zip(drawn).filter_map(|(name, picture)| Some((name, picture?))).collect()
 }
