@@ -3,6 +3,7 @@
 //! solid, and exports and reports write it down.
 
 // What goes in.
+pub mod source;
 pub mod calibration;
 
 // What happens to it.

@@ -1,21 +1,18 @@
 //! `host`: parse, run, exit code.
+//!
+//! 0: done. 1: refused or failed, with one sentence on standard error. 2: wrong usage.
 
 use clap::Parser;
-use host::command::inspect;
+use host::command::{Cli, words_of};
+use std::io::Write;
 use std::process::ExitCode;
 
-#[derive(Parser)]
-enum Cli {
-    /// Run one stage of one view
-    Inspect(inspect::Args),
-}
-
 fn main() -> ExitCode {
-    let Cli::Inspect(args) = Cli::parse();
-    let Err(failure) = inspect::run(&args) else { return ExitCode::SUCCESS };
+    let Err(failure) = Cli::parse().run() else { return ExitCode::SUCCESS };
     if let Some(usage) = failure.downcast_ref::<clap::Error>() {
         usage.exit();
     }
-    eprintln!("error: {failure}");
+    // When nobody listens there is nobody to tell.
+    let _ = writeln!(std::io::stderr(), "error: {}", words_of(&*failure));
     ExitCode::FAILURE
 }

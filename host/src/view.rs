@@ -1,5 +1,9 @@
 //! What a renderer and a ruler need to know of a camera.
 
+mod calibrated;
+
+pub use calibrated::Calibrated;
+
 use nalgebra::{Point3, Vector3};
 
 /// A camera as rays: which ray a pixel looks along, and which pixel a point falls on.

@@ -1,3 +1,169 @@
-//! What the user asks for: one file a subcommand.
+//! Closed, metric 3D models of textureless objects from one stereo pair each.
+//!
+//! Every length is in millimetres, in the axes of the left camera: x right, y down, z forward.
+//!
+//! Examples:
+//!   host demo                               try it: no camera, no files needed
+//!   host replay left.png right.png --calib calib.yaml
+//!   host replay recordings/ --out models    every pair in a folder
+//!   host render mesh.obj --out pair         a pair of any mesh that you have
+//!   host evaluate model.ply truth.ply       how far a model is from the truth
+//!
+//! Exit codes: 0 done, 1 refused or failed, 2 wrong usage.
 
+pub mod completions;
+pub mod demo;
+pub mod evaluate;
 pub mod inspect;
+mod batch;
+mod model;
+pub mod options;
+pub mod render;
+pub mod replay;
+mod scene;
+mod table;
+
+use std::error::Error;
+use std::io::{self, Write};
+
+use clap::{Parser, Subcommand};
+
+/// Why a command did not do what it was asked.
+pub type Failure = Box<dyn Error + Send + Sync>;
+
+/// The command line.
+#[derive(Debug, Parser)]
+#[command(
+    name = "host",
+    version,
+    about = "Closed, metric 3D models of textureless objects from one stereo pair each"
+)]
+#[command(long_about = page(include_str!("mod.rs")))]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+/// What can be asked for.
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Models from recorded pairs
+    #[command(long_about = page(include_str!("replay.rs")))]
+    Replay(replay::Args),
+    /// A model from a built-in pair, held against the truth
+    #[command(long_about = page(include_str!("demo.rs")))]
+    Demo(demo::Args),
+    /// A stereo pair of any mesh
+    #[command(long_about = page(include_str!("render.rs")))]
+    Render(render::Args),
+    /// How far a model is from the truth
+    #[command(long_about = page(include_str!("evaluate.rs")))]
+    Evaluate(evaluate::Args),
+    /// One stage of one view, drawn and timed
+    #[command(long_about = page(include_str!("inspect.rs")))]
+    Inspect(inspect::Args),
+    /// Completions for a shell
+    #[command(long_about = page(include_str!("completions.rs")))]
+    Completions(completions::Args),
+}
+
+impl Cli {
+    /// Does what the command line asks for.
+    ///
+    /// # Errors
+    ///
+    /// A [`clap::Error`] for wrong usage; otherwise a sentence for the user.
+    pub fn run(&self) -> Result<(), Failure> {
+        match &self.command {
+            Command::Replay(args) => replay::run(args),
+            Command::Demo(args) => demo::run(args),
+            Command::Render(args) => render::run(args),
+            Command::Evaluate(args) => evaluate::run(args),
+            Command::Inspect(args) => inspect::run(args),
+            Command::Completions(args) => completions::run(args),
+        }
+    }
+}
+
+/// A failure and its causes in one sentence; a cause that is told already is left out.
+#[must_use]
+pub fn words_of(failure: &(dyn Error + 'static)) -> String {
+    let mut words = failure.to_string();
+    let mut cause = failure.source();
+    while let Some(error) = cause {
+        let more = error.to_string();
+        if !words.contains(&more) {
+            words = format!("{words}: {more}");
+        }
+        cause = error.source();
+    }
+    words
+}
+
+/// Writes to standard output. That nobody reads on (`| head`) is no failure.
+fn say(text: &str) -> Result<(), Failure> {
+    let mut out = io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            Err(format!("cannot write to standard output: {error}").into())
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Writes a JSON document to standard output.
+fn say_json(value: &serde_json::Value) -> Result<(), Failure> {
+    say(&format!("{value:#}\n"))
+}
+
+/// Writes a line to standard error, if anybody listens.
+fn note(line: &str) {
+    let _ = writeln!(io::stderr(), "{line}");
+}
+
+/// The help page at the head of a source file: its `//!` lines. Paragraphs become one line each, which is
+/// wrapped to the terminal; indented lines stay as they are.
+fn page(source: &str) -> String {
+    let mut page = String::new();
+    for line in source.lines().map_while(|line| line.strip_prefix("//!")) {
+        let line = line.strip_prefix(' ').unwrap_or(line);
+        let flows = !(line.is_empty() || line.starts_with(' ') || page.is_empty() || page.ends_with('\n'));
+        page.push_str(if flows { " " } else { "" });
+        page.push_str(line);
+        if line.is_empty() {
+            page.push_str(if page.ends_with('\n') { "\n" } else { "\n\n" });
+        } else if line.starts_with(' ') || line.ends_with(':') {
+            page.push('\n');
+        }
+    }
+    page
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_sound() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn help_is_the_head_of_the_file() {
+        let source = "//! One\n//! two.\n//!\n//! Examples:\n//!   a\n//!   b\n\nuse x;\n//! not this\n";
+        assert_eq!(page(source), "One two.\n\nExamples:\n  a\n  b\n");
+    }
+
+    #[test]
+    fn causes_are_told_once() {
+        let cause = io::Error::other("disk full");
+        let export = crate::export::ExportError::Io { path: "a".into(), source: cause };
+        assert_eq!(words_of(&export), "cannot write a: disk full");
+        let told = crate::calibration::CalibrationError::Unreadable {
+            path: "b".into(),
+            source: io::Error::other("gone"),
+        };
+        assert_eq!(words_of(&told), "cannot read the calibration b: gone");
+    }
+}

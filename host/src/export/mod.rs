@@ -37,7 +37,7 @@ pub enum ExportError {
 }
 
 /// Creates or replaces the file `path` by what `write` writes, all or nothing.
-fn write_whole(
+pub(crate) fn write_whole(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<&mut tempfile::NamedTempFile>) -> io::Result<()>,
 ) -> Result<(), ExportError> {

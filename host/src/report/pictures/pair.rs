@@ -183,7 +183,8 @@ fn matches(views: &[Seen<'_>; 2], pair: &Matches, offset: i32) -> (Vec<Match>, V
     if pair.rows.is_empty() {
         let of = |p: &shared::stage::nearest::Pair| (p.left, p.right, px(p.left.u - p.right.u));
         let all: Vec<Match> = pair.boundary_pairs.iter().map(of).collect();
-        let rows = pair.boundary_pairs.iter().map(of).filter(|m| m.0.v == band(m.0) * step * shared::fixed::PX);
+        let rows =
+            pair.boundary_pairs.iter().map(of).filter(|m| m.0.v == band(m.0) * step * shared::fixed::PX);
         return (all, rows.collect());
     }
     let parts = views[0].parts;

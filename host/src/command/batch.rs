@@ -1,0 +1,62 @@
+//! Many jobs on a few threads, each job undisturbed by the others.
+//!
+//! A thread that waits inside a shared pool takes up another job meanwhile, and the time of that one would
+//! count for both. So every worker here has a pool of its own, with an equal share of the threads.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+
+use rayon::{ThreadPoolBuildError, ThreadPoolBuilder};
+
+/// Does the jobs 0 to `count` on `threads` threads, by default one a core. Results in the order of the
+/// jobs.
+pub(super) fn run<T: Send>(
+    count: usize,
+    threads: Option<usize>,
+    job: &(impl Fn(usize) -> T + Sync),
+) -> Result<Vec<T>, ThreadPoolBuildError> {
+    let threads = threads.unwrap_or_else(rayon::current_num_threads).max(1);
+    let workers = threads.min(count).max(1);
+    let pools = (0..workers).map(|worker| {
+        let share = threads / workers + usize::from(worker < threads % workers);
+        ThreadPoolBuilder::new().num_threads(share).build()
+    });
+    let pools = pools.collect::<Result<Vec<_>, _>>()?;
+    let next = AtomicUsize::new(0);
+    let results = Mutex::new(Vec::with_capacity(count));
+    thread::scope(|scope| {
+        for pool in &pools {
+            scope.spawn(|| {
+                loop {
+                    let index = next.fetch_add(1, Ordering::Relaxed);
+                    if index >= count {
+                        break;
+                    }
+                    let result = pool.install(|| job(index));
+                    // A lock is poisoned only by a panic, which the scope passes on.
+                    if let Ok(mut results) = results.lock() {
+                        results.push((index, result));
+                    }
+                }
+            });
+        }
+    });
+    let mut results = results.into_inner().unwrap_or_default();
+    results.sort_by_key(|&(index, _)| index);
+    Ok(results.into_iter().map(|(_, result)| result).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn results_come_in_order_whatever_the_threads() {
+        for threads in [None, Some(1), Some(3), Some(8)] {
+            let squares = run(5, threads, &|index| index * index).unwrap();
+            assert_eq!(squares, [0, 1, 4, 9, 16]);
+            assert_eq!(run(0, threads, &|index| index).unwrap(), [0usize; 0]);
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! What the commands that reconstruct have in common: the choices of the method, and the cameras.
+
+use std::path::PathBuf;
+
+use clap::error::ErrorKind;
+use clap::{CommandFactory, ValueEnum};
+use image::GrayImage;
+use shared::stage::binarise::{Polarity, Threshold};
+use shared::stage::thinning::Rule;
+
+use super::{Cli, Failure};
+use crate::calibration::StereoCamera;
+use crate::reconstruct::{self, Options};
+use crate::report::words::{parse_polarity, parse_rule, parse_threshold};
+use crate::source::Pair;
+
+/// How the solid is found.
+#[derive(Clone, Debug, clap::Args)]
+#[command(next_help_heading = "Method")]
+pub struct MethodArgs {
+    /// The method: what works, or what the paper says to the letter
+    #[arg(
+        long,
+        value_enum,
+        default_value = "default",
+        hide_possible_values = true,
+        value_name = "default|paper"
+    )]
+    mode: Mode,
+    /// Consecutive quadruplets of hull vertices compared, with --mode paper [default: 3]
+    #[arg(long, value_parser = clap::value_parser!(u8).range(1..=3), value_name = "1|2|3")]
+    omega: Option<u8>,
+    /// Grey level between object and background
+    #[arg(long, value_parser = parse_threshold, default_value = "otsu", value_name = "otsu|N")]
+    threshold: Threshold,
+    /// Whether the object is brighter or darker than the background
+    #[arg(long, value_parser = parse_polarity, default_value = "bright", value_name = "bright|dark|auto")]
+    polarity: Polarity,
+    /// How the outline is thinned [default: edt, or hit-or-miss with --mode paper]
+    #[arg(long, value_parser = parse_rule, value_name = "edt|hit-or-miss|zhang-suen|guo-hall")]
+    thinning: Option<Rule>,
+    /// Edge length of the model's mesh, mm [default: two pixels at the object]
+    #[arg(long, value_parser = positive, value_name = "MM")]
+    resolution: Option<f64>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Mode {
+    Default,
+    Paper,
+}
+
+impl MethodArgs {
+    /// The choices in the terms of [`crate::reconstruct`].
+    ///
+    /// # Errors
+    ///
+    /// A [`clap::Error`] if they contradict each other.
+    pub fn options(&self) -> Result<Options, Failure> {
+        let mode = match (self.mode, self.omega) {
+            (Mode::Default, None) => reconstruct::Mode::Default,
+            (Mode::Paper, omega) => reconstruct::Mode::Paper { omega: usize::from(omega.unwrap_or(3)) },
+            (Mode::Default, Some(_)) => return Err(usage("--omega belongs to --mode paper")),
+        };
+        let (thinning, threshold, polarity) = (self.thinning, self.threshold, self.polarity);
+        Ok(Options { mode, thinning, threshold, polarity, cell: self.resolution })
+    }
+}
+
+/// What the pixels mean.
+#[derive(Clone, Debug, clap::Args)]
+#[command(next_help_heading = "Cameras")]
+pub struct CameraArgs {
+    /// Calibration of the pair: OpenCV (M1 D1 M2 D2 R T), ROS or Kalibr
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["focal", "baseline"])]
+    calib: Option<PathBuf>,
+    /// Focal length of a rectified pair without calibration, px
+    #[arg(long, value_name = "PX", value_parser = positive, requires = "baseline")]
+    focal: Option<f64>,
+    /// Distance between its cameras, mm
+    #[arg(long, value_name = "MM", value_parser = positive, requires = "focal")]
+    baseline: Option<f64>,
+}
+
+/// There is nothing to tell millimetres by.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "there is no calibration, and without one the model has no scale; give --calib FILE, put calib.yaml beside the \
+     images, or give --focal PX and --baseline MM of a rectified pair"
+)]
+pub struct NoCalibration;
+
+impl CameraArgs {
+    /// The calibration for a pair with these images, and the file beside the images that it comes from, if it
+    /// does.
+    ///
+    /// # Errors
+    ///
+    /// [`NoCalibration`], or what is wrong with the one there is.
+    pub fn of(&self, pair: &Pair, left: &GrayImage) -> Result<(StereoCamera, Option<PathBuf>), Failure> {
+        if let (Some(focal), Some(baseline)) = (self.focal, self.baseline) {
+            let camera = StereoCamera::rectified(left.width(), left.height(), focal, baseline);
+            camera.check()?;
+            return Ok((camera, None));
+        }
+        if let Some(path) = &self.calib {
+            return Ok((StereoCamera::read(path)?, None));
+        }
+        let beside = pair.calibration.clone().ok_or(NoCalibration)?;
+        Ok((StereoCamera::read(&beside)?, Some(beside)))
+    }
+}
+
+/// Wrong usage that the parser cannot see.
+pub(super) fn usage(what: &str) -> Failure {
+    Cli::command().error(ErrorKind::ArgumentConflict, what).into()
+}
+
+/// A positive number.
+pub(super) fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number.is_finite() && number > 0.0 => Ok(number),
+        _ => Err("must be a positive number".into()),
+    }
+}

@@ -1,0 +1,207 @@
+//! Models from recorded stereo pairs.
+//!
+//! INPUT is two files, LEFT RIGHT; or one image that holds both views; or a folder or pattern with many
+//! pairs, named left_0001 and right_0001, im0 and im1 (Middlebury), cam0/data and cam1/data (EuRoC), or
+//! lying in a folder each as left.png and right.png. Images may be PNG, JPEG, PGM, BMP or TIFF; colours
+//! become grey.
+//!
+//! The pair's calibration is --calib, or else calib.yaml beside the images (or in a folder above them, up
+//! to the one named). Without any, give --focal and --baseline if the pair is rectified.
+//!
+//! Two files, or one, leave their results in --out; folders and patterns leave those of each pair in a
+//! folder of its own below. There: model.ply (closed, mm, axes of the left camera), skeleton.ply,
+//! boundary.ply, report.json and pictures of every stage. What does not give a trustworthy model is
+//! refused with the reason, and leaves no files; the other pairs go on.
+//!
+//! Examples:
+//!   host replay left.png right.png --calib calib.yaml
+//!   host replay left.png right.png --focal 750 --baseline 60
+//!   host replay both.png --layout side-by-side --calib calib.yaml --out cup
+//!   host replay recordings/ --out models --no-pictures --json > models.json
+//!   host replay 'recordings/*/left.png' --polarity dark
+
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::json;
+
+use super::model::{self, Model, Order};
+use super::options::{CameraArgs, MethodArgs};
+use super::table::Table;
+use super::{Failure, batch, note, say, say_json, words_of};
+use crate::reconstruct::Options;
+use crate::source::find::{Found, find};
+use crate::source::{Files, Layout, Pair};
+
+/// Arguments of `replay`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// LEFT RIGHT, or one image with both views, or folders or patterns of pairs
+    #[arg(required = true)]
+    input: Vec<String>,
+    /// How views lie in files [default: as the number of files says]
+    #[arg(long, value_enum)]
+    layout: Option<Layout>,
+    /// Exchange left and right
+    #[arg(long)]
+    swap: bool,
+    #[command(flatten)]
+    cameras: CameraArgs,
+    #[command(flatten)]
+    method: MethodArgs,
+    /// Threads [default: one a core]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    jobs: Option<u16>,
+    /// Folder for the results
+    #[arg(long, value_name = "DIR", default_value = "ossature-out")]
+    out: PathBuf,
+    /// Draw no pictures of the stages
+    #[arg(long)]
+    no_pictures: bool,
+    /// Print one JSON document instead of text
+    #[arg(long)]
+    json: bool,
+}
+
+/// What became of a pair.
+struct Done<'a> {
+    pair: &'a Pair,
+    folder: PathBuf,
+    result: Result<Success, Failure>,
+}
+
+struct Success {
+    model: Model,
+    warnings: Vec<String>,
+    /// The calibration, if it was found beside the images.
+    calibration: Option<PathBuf>,
+}
+
+/// Reconstructs every pair.
+///
+/// # Errors
+///
+/// If there is no pair, or any is refused.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let options = args.method.options()?;
+    let found = find(&args.input, args.layout)?;
+    let done = all(args, &options, &found)?;
+    if args.json {
+        say_json(&as_json(&done, &found))?;
+    } else {
+        say(&as_text(&done, &found))?;
+    }
+    summary(done, &found)
+}
+
+/// Every pair, in parallel; results in the order of the pairs.
+fn all<'a>(args: &Args, options: &Options, found: &'a Found) -> Result<Vec<Done<'a>>, Failure> {
+    let pairs = &found.pairs;
+    let bar = if pairs.len() > 1 && std::io::stderr().is_terminal() {
+        ProgressBar::new(pairs.len() as u64)
+    } else {
+        ProgressBar::hidden()
+    };
+    if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} pairs, {eta} left") {
+        bar.set_style(style);
+    }
+    let job = |index: usize| {
+        let pair = &pairs[index];
+        let folder = if found.single { args.out.clone() } else { args.out.join(&pair.name) };
+        let result = one(args, options, pair, &folder).map_err(|failure| with_guess(pair, failure));
+        bar.inc(1);
+        Done { pair, folder, result }
+    };
+    let done = batch::run(pairs.len(), args.jobs.map(usize::from), &job)?;
+    bar.finish_and_clear();
+    Ok(done)
+}
+
+fn one(args: &Args, options: &Options, pair: &Pair, folder: &Path) -> Result<Success, Failure> {
+    let mut views = pair.load()?;
+    if args.swap {
+        views.images.reverse();
+    }
+    let (calibration, beside) = args.cameras.of(pair, &views.images[0])?;
+    let model = model::make(Order {
+        images: views.images,
+        calibration: &calibration,
+        options,
+        pictures: !args.no_pictures,
+        truth: None,
+        folder,
+    })?;
+    let warnings = views.warnings.into_iter().chain(model.warnings()).collect();
+    Ok(Success { model, warnings, calibration: beside })
+}
+
+/// A failure, with a hint if the user may have forgotten the other image.
+fn with_guess(pair: &Pair, failure: Failure) -> Failure {
+    match pair.files {
+        Files::One(_, None) => format!(
+            "{}; one image was given and taken for both views: give two, or --layout if it was halved the wrong way",
+            words_of(&*failure)
+        )
+        .into(),
+        _ => failure,
+    }
+}
+
+fn as_text(done: &[Done<'_>], found: &Found) -> String {
+    let mut text = String::new();
+    for Done { pair, folder, result } in done {
+        let Ok(success) = result else { continue };
+        let mut table = Table::new(&pair.name);
+        success.model.tell(&mut table);
+        if let Some(path) = &success.calibration {
+            table.row("calibration", &format!("{}, found beside the images", path.display()));
+        }
+        for warning in &success.warnings {
+            table.row("warning", warning);
+        }
+        table.row("time", &format!("{:.2} s", success.model.time.as_secs_f64()));
+        table.row("files", &folder.display().to_string());
+        text.push_str(table.text());
+    }
+    if !found.single {
+        let good = done.iter().filter(|done| done.result.is_ok()).count();
+        text.push_str(&format!("{good} of {} pairs have a model", done.len()));
+        if !found.alone.is_empty() {
+            text.push_str(&format!("; {} images have no partner", found.alone.len()));
+        }
+        text.push('\n');
+    }
+    text
+}
+
+fn as_json(done: &[Done<'_>], found: &Found) -> serde_json::Value {
+    let pair = |Done { pair, folder, result }: &Done<'_>| match result {
+        Ok(Success { model, warnings, calibration }) => json!({
+            "name": pair.name,
+            "folder": folder,
+            "calibration_found": calibration,
+            "warnings": warnings,
+            "report": model.report,
+        }),
+        Err(failure) => json!({ "name": pair.name, "error": words_of(&**failure) }),
+    };
+    json!({ "pairs": done.iter().map(pair).collect::<Vec<_>>(), "without_partner": found.alone })
+}
+
+/// Says which pairs were refused. The only pair's refusal is the command's.
+fn summary(done: Vec<Done<'_>>, found: &Found) -> Result<(), Failure> {
+    let count = done.len();
+    let refused = done.into_iter().filter_map(|done| Some((done.pair, done.result.err()?)));
+    let mut refused: Vec<_> = refused.collect();
+    if found.single {
+        return refused.pop().map_or(Ok(()), |(_, failure)| Err(failure));
+    }
+    for (pair, failure) in &refused {
+        note(&format!("error: {}: {}", pair.name, words_of(&**failure)));
+    }
+    match refused.len() {
+        0 => Ok(()),
+        refused => Err(format!("{refused} of {count} pairs were refused").into()),
+    }
+}

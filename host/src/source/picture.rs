@@ -1,0 +1,208 @@
+//! One image file to grey values.
+//!
+//! In: PNG, JPEG, PGM/PPM, BMP or TIFF, told apart by content. Out: 8-bit grey values: colours become luma
+//! (BT.709), 16-bit values are scaled. Sizes are held against a limit before any pixel gets memory.
+//!
+//! Decoders of JPEG go on where bytes are damaged, and half a silhouette looks like an object. So a JPEG is
+//! first read strictly; one that fails is refused if it ends too early, and flagged otherwise.
+
+use std::fs;
+use std::io::{self, Cursor};
+use std::path::{Path, PathBuf};
+
+use image::{GrayImage, ImageError, ImageFormat, ImageReader, Limits};
+use shared::limits::MAX_SIDE;
+use zune_jpeg::zune_core::bytestream::ZCursor;
+use zune_jpeg::zune_core::options::DecoderOptions;
+
+/// Longest side of a file that holds both views, px.
+const MAX_PX: u32 = 2 * MAX_SIDE as u32;
+/// Most memory that a decoder may take, bytes: the largest image with four 16-bit channels.
+const MAX_ALLOC: u64 = 8 * (MAX_PX as u64) * (MAX_SIDE as u64);
+/// Largest file, bytes: an uncompressed image of that size.
+const MAX_FILE: u64 = MAX_ALLOC + (1 << 20);
+/// What ends a JPEG.
+const END_OF_IMAGE: [u8; 2] = [0xff, 0xd9];
+
+/// Why there is no image.
+#[derive(Debug, thiserror::Error)]
+pub enum PictureError {
+    /// The system refused.
+    #[error("cannot read the image {}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The file is no image of a known kind.
+    #[error("{} is no image that can be read; give PNG, JPEG, PGM, BMP or TIFF", path.display())]
+    Unknown {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The bytes are damaged or end too early.
+    #[error("{} is damaged or cut short; copy or record it again", path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// What the decoder said.
+        source: ImageError,
+    },
+    /// A JPEG without its end.
+    #[error("{} is cut short: its end is missing; copy or record it again", path.display())]
+    CutShort {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The image is larger than is read.
+    #[error(
+        "{} says that it is larger than is read, which is {MAX_PX} px a side; give smaller images", path.display()
+    )]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Both views in one image, but its halves differ.
+    #[error(
+        "{} has {length} rows or columns, which cannot be halved; check --layout", path.display()
+    )]
+    OddHalves {
+        /// The file.
+        path: PathBuf,
+        /// The length to be halved, px.
+        length: u32,
+    },
+}
+
+/// An image, and what is suspicious about its file.
+#[derive(Clone, Debug)]
+pub struct Loaded {
+    /// Grey values.
+    pub image: GrayImage,
+    /// A sentence for the user.
+    pub warning: Option<String>,
+}
+
+/// Reads the image in the file `path`.
+///
+/// # Errors
+///
+/// See [`PictureError`].
+pub fn load(path: &Path) -> Result<Loaded, PictureError> {
+    let io_error = |source| PictureError::Io { path: path.into(), source };
+    if fs::metadata(path).map_err(io_error)?.len() > MAX_FILE {
+        return Err(PictureError::TooLarge { path: path.into() });
+    }
+    let bytes = fs::read(path).map_err(io_error)?;
+    let reader = ImageReader::new(Cursor::new(bytes.as_slice())).with_guessed_format().map_err(io_error)?;
+    let warning = match reader.format() {
+        None => return Err(PictureError::Unknown { path: path.into() }),
+        Some(ImageFormat::Jpeg) => jpeg_damage(path, &bytes)?,
+        Some(_) => None,
+    };
+    decode(path, reader).map(|image| Loaded { image, warning })
+}
+
+fn decode(path: &Path, mut reader: ImageReader<Cursor<&[u8]>>) -> Result<GrayImage, PictureError> {
+    let mut limits = Limits::default();
+    limits.max_image_width = Some(MAX_PX);
+    limits.max_image_height = Some(MAX_PX);
+    limits.max_alloc = Some(MAX_ALLOC);
+    reader.limits(limits);
+    let path = path.to_path_buf();
+    match reader.decode() {
+        Ok(image) => Ok(image.into_luma8()),
+        Err(ImageError::Limits(_)) => Err(PictureError::TooLarge { path }),
+        Err(ImageError::Unsupported(_)) => Err(PictureError::Unknown { path }),
+        Err(source) => Err(PictureError::Damaged { path, source }),
+    }
+}
+
+/// A warning if a strict decoder stumbles over the file.
+fn jpeg_damage(path: &Path, bytes: &[u8]) -> Result<Option<String>, PictureError> {
+    let side = MAX_PX as usize;
+    let options = DecoderOptions::default().set_strict_mode(true).set_max_width(side).set_max_height(side);
+    let mut decoder = zune_jpeg::JpegDecoder::new_with_options(ZCursor::new(bytes), options);
+    if decoder.decode_headers().is_err() {
+        // Whether the header is too large or broken, the decoder of all formats will say.
+        return Ok(None);
+    }
+    let Err(damage) = decoder.decode() else { return Ok(None) };
+    if !bytes.windows(2).rev().take(64).any(|end| end == END_OF_IMAGE) {
+        return Err(PictureError::CutShort { path: path.into() });
+    }
+    Ok(Some(format!(
+        "{} is a damaged JPEG ({damage}); the outline may be wrong, so record it again, as PNG if possible",
+        path.display()
+    )))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::{DynamicImage, ImageBuffer, Luma};
+
+    fn bytes_of(image: &DynamicImage, format: ImageFormat) -> Vec<u8> {
+        let mut bytes = Cursor::new(Vec::new());
+        image.write_to(&mut bytes, format).unwrap();
+        bytes.into_inner()
+    }
+
+    fn told(name: &str, bytes: &[u8]) -> Result<Loaded, PictureError> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        fs::write(&path, bytes).unwrap();
+        load(&path)
+    }
+
+    fn disc() -> DynamicImage {
+        let inside = |u: u32, v: u32| (u as i32 - 64).pow(2) + (v as i32 - 64).pow(2) < 1600;
+        GrayImage::from_fn(128, 128, |u, v| Luma([if inside(u, v) { 200 } else { 10 }])).into()
+    }
+
+    #[test]
+    fn sixteen_bits_are_scaled() {
+        let deep: ImageBuffer<Luma<u16>, Vec<u16>> = ImageBuffer::from_pixel(4, 3, Luma([0x80_80]));
+        let loaded = told("deep.png", &bytes_of(&deep.into(), ImageFormat::Png)).unwrap();
+        assert_eq!(loaded.image, GrayImage::from_pixel(4, 3, Luma([0x80])));
+    }
+
+    #[test]
+    fn a_file_cut_short_is_refused_at_any_length() {
+        for format in [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::Pnm, ImageFormat::Bmp] {
+            let whole = bytes_of(&disc(), format);
+            assert!(told("whole", &whole).is_ok_and(|loaded| loaded.warning.is_none()), "{format:?}");
+            for part in [1, 10, 50, 90, 99] {
+                let cut = &whole[..whole.len() * part / 100];
+                assert!(told("cut", cut).is_err(), "{format:?} at {part} %");
+            }
+        }
+    }
+
+    #[test]
+    fn a_damaged_jpeg_is_flagged_where_the_decoder_notices() {
+        let mut bytes = bytes_of(&disc(), ImageFormat::Jpeg);
+        let middle = bytes.len() * 3 / 4;
+        // A marker in the middle of the scan.
+        bytes[middle..middle + 2].copy_from_slice(&[0xff, 0xc4]);
+        match told("damaged.jpg", &bytes) {
+            Ok(loaded) => assert!(loaded.warning.is_some_and(|text| text.contains("damaged JPEG"))),
+            Err(error) => assert!(matches!(error, PictureError::Damaged { .. }), "{error}"),
+        }
+    }
+
+    #[test]
+    fn huge_headers_are_refused_before_memory_is_taken() {
+        assert!(matches!(told("a.pgm", b"P5 60000 60000 255\n"), Err(PictureError::TooLarge { .. })));
+        let mut bmp = bytes_of(&disc(), ImageFormat::Bmp);
+        bmp[18..26].copy_from_slice([60_000_u32; 2].map(u32::to_le_bytes).as_flattened());
+        assert!(matches!(told("a.bmp", &bmp), Err(PictureError::TooLarge { .. })));
+    }
+
+    #[test]
+    fn what_is_no_image_is_named() {
+        let error = told("notes.png", b"hello").unwrap_err();
+        assert!(error.to_string().contains("notes.png is no image"), "{error}");
+    }
+}

@@ -1,0 +1,391 @@
+//! The program as its users meet it: the binary, its exit codes, what it prints and the files it leaves.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Output, Stdio};
+use std::sync::LazyLock;
+
+use assert_cmd::Command;
+use host::calibration::{Distortion, StereoCamera};
+use host::mesh::Mesh;
+use host::shape::Shape;
+use nalgebra::{Rotation3, Vector3};
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// A quarter of the usual pixels: quick, and enough to tell right from wrong.
+const SMALL: [&str; 4] = ["--size", "320x240", "--focal", "375"];
+
+/// A small pair of a torus: left.png, right.png, calib.yaml, truth.ply.
+static TORUS: LazyLock<TempDir> = LazyLock::new(|| {
+    let folder = TempDir::new().unwrap();
+    let mut args = vec!["render", "torus", "--out", folder.path().to_str().unwrap()];
+    args.extend(SMALL);
+    good(Path::new("."), &args);
+    folder
+});
+
+fn torus(name: &str) -> String {
+    TORUS.path().join(name).display().to_string()
+}
+
+fn run(folder: &Path, args: &[&str]) -> Output {
+    Command::cargo_bin("host").unwrap().current_dir(folder).args(args).output().unwrap()
+}
+
+/// Standard output of a run that succeeds.
+fn good(folder: &Path, args: &[&str]) -> String {
+    let output = run(folder, args);
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(0), "{args:?}: {told}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// Standard error of a run that fails with a code.
+fn bad(folder: &Path, args: &[&str], code: i32) -> String {
+    let output = run(folder, args);
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(code), "{args:?}: {told}");
+    assert!(told.starts_with("error: "), "{told}");
+    told
+}
+
+fn json(text: &str) -> Value {
+    serde_json::from_str(text).unwrap()
+}
+
+/// The bytes of every file that a run leaves, but for the times in the report.
+fn results(folder: &Path) -> Vec<(String, Vec<u8>)> {
+    let read = |name: &str| fs::read(folder.join(name)).unwrap();
+    let mut report = json(std::str::from_utf8(&read("report.json")).unwrap());
+    assert!(report.as_object_mut().unwrap().remove("times_ms").is_some());
+    let mut files: Vec<_> =
+        ["model.ply", "skeleton.ply", "boundary.ply"].map(|name| (name.to_owned(), read(name))).to_vec();
+    files.push(("report.json".into(), report.to_string().into_bytes()));
+    files
+}
+
+/// What two torus files give.
+fn expected() -> Vec<(String, Vec<u8>)> {
+    static RESULTS: LazyLock<Vec<(String, Vec<u8>)>> = LazyLock::new(|| {
+        let folder = TempDir::new().unwrap();
+        good(
+            folder.path(),
+            &["replay", &torus("left.png"), &torus("right.png"), "--no-pictures", "--jobs", "1"],
+        );
+        results(&folder.path().join("ossature-out"))
+    });
+    RESULTS.clone()
+}
+
+#[test]
+fn demos_are_as_good_as_they_say() {
+    for (name, percent) in [("torus", 0.1), ("sphere", 0.1)] {
+        let folder = TempDir::new().unwrap();
+        let told = json(&good(folder.path(), &["demo", name, "--json"]));
+        let error = told["evaluation"]["distance"]["symmetric"]["mean_pct"].as_f64().unwrap();
+        assert!(error < percent, "{name}: {error} %");
+        assert!(told["evaluation"]["volume_iou"].as_f64().unwrap() > 0.98);
+        for axis in told["size_error_mm"].as_array().unwrap() {
+            assert!(axis.as_f64().unwrap().abs() < 1.0, "{name}: {told}");
+        }
+        let left = folder.path().join("ossature-demo").join(name);
+        for file in ["left.png", "right.png", "calib.yaml", "truth.ply", "model.ply", "report.json"] {
+            assert!(left.join(file).is_file(), "{file}");
+        }
+        // What the demo leaves can be replayed.
+        let again = ["replay", left.to_str().unwrap(), "--out", "again", "--no-pictures"];
+        good(folder.path(), &again);
+        let [first, second] =
+            [left, folder.path().join("again").join(name)].map(|f| fs::read(f.join("model.ply")));
+        assert_eq!(first.unwrap(), second.unwrap());
+    }
+}
+
+fn as_obj(mesh: &Mesh, scale: f64) -> String {
+    let vertices =
+        mesh.vertices.iter().map(|v| format!("v {} {} {}\n", v.x * scale, v.y * scale, v.z * scale));
+    let faces = mesh.faces.iter().map(|[a, b, c]| format!("f {} {} {}\n", a + 1, b + 1, c + 1));
+    vertices.chain(faces).collect()
+}
+
+fn as_stl(mesh: &Mesh) -> String {
+    let face = |corners: &[u32; 3]| {
+        let corner = |&v: &u32| {
+            let v = mesh.vertices[v as usize];
+            format!("vertex {} {} {}\n", v.x, v.y, v.z)
+        };
+        let corners: String = corners.iter().map(corner).collect();
+        format!("facet normal 0 0 0\nouter loop\n{corners}endloop\nendfacet\n")
+    };
+    let faces: String = mesh.faces.iter().map(face).collect();
+    format!("solid capsule\n{faces}endsolid capsule\n")
+}
+
+/// Mean error in percent of a model of what was rendered into `pair`.
+fn error_of(folder: &Path, pair: &str) -> f64 {
+    good(folder, &["replay", pair, "--no-pictures"]);
+    let model = format!("ossature-out/{pair}/model.ply");
+    let (truth, calibration) = (format!("{pair}/truth.ply"), format!("{pair}/calib.yaml"));
+    let told =
+        good(folder, &["evaluate", &model, &truth, "--calib", &calibration, "--samples", "2000", "--json"]);
+    let told = json(&told);
+    assert!(told["silhouette_iou"][1].as_f64().unwrap() > 0.97, "{told}");
+    told["distance"]["symmetric"]["mean_pct"].as_f64().unwrap()
+}
+
+#[test]
+fn any_mesh_can_be_tried() {
+    let folder = TempDir::new().unwrap();
+    let capsule = Shape::Capsule.mesh(6.0);
+    fs::write(folder.path().join("capsule.obj"), as_obj(&capsule, 1e-3)).unwrap();
+    fs::write(folder.path().join("capsule.stl"), as_stl(&capsule)).unwrap();
+    host::export::ply::write_mesh(&folder.path().join("capsule.ply"), &capsule, &[]).unwrap();
+    for (file, scale) in [("capsule.obj", "1000"), ("capsule.stl", "1"), ("capsule.ply", "1")] {
+        let pair = file.replace('.', "-");
+        let mut args = vec!["render", file, "--scale", scale, "--out", &pair];
+        args.extend(SMALL);
+        good(folder.path(), &args);
+        let error = error_of(folder.path(), &pair);
+        assert!(error < 0.4, "{file}: {error} %");
+    }
+}
+
+#[test]
+fn turned_cameras_with_lenses_give_the_same_shape() {
+    let folder = TempDir::new().unwrap();
+    let mut pair = StereoCamera::rectified(320, 240, 375.0, 60.0);
+    pair.rotation = Rotation3::from_euler_angles(0.01, 0.1, -0.01).into_inner();
+    pair.translation = Vector3::new(-60.0, 1.0, 4.0);
+    pair.left.distortion =
+        Distortion::Polynomial([-0.2, 0.05, 1e-3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    pair.right.distortion =
+        Distortion::Polynomial([-0.18, 0.04, 0.0, 5e-4, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    pair.write_opencv_yaml(folder.path().join("turned.yaml")).unwrap();
+    good(folder.path(), &["render", "torus", "--place", "auto", "--calib", "turned.yaml", "--out", "pair"]);
+    let error = error_of(folder.path(), "pair");
+    assert!(error < 0.4, "{error} %");
+}
+
+#[test]
+fn every_way_to_give_a_pair_gives_the_same_bytes() {
+    let folder = TempDir::new().unwrap();
+    let [left, right] = ["left.png", "right.png"].map(|name| image::open(torus(name)).unwrap().into_luma8());
+    let (width, height) = left.dimensions();
+    let put = |beside: bool| {
+        let (w, h) = if beside { (2 * width, height) } else { (width, 2 * height) };
+        let mut both = image::GrayImage::new(w, h);
+        let (x, y) = if beside { (width, 0) } else { (0, height) };
+        image::imageops::replace(&mut both, &left, 0, 0);
+        image::imageops::replace(&mut both, &right, x.into(), y.into());
+        both
+    };
+    put(true).save(folder.path().join("beside.png")).unwrap();
+    put(false).save(folder.path().join("above.png")).unwrap();
+    let euroc = folder.path().join("euroc");
+    for (image, eye) in [(&left, "cam0"), (&right, "cam1")] {
+        fs::create_dir_all(euroc.join(eye).join("data")).unwrap();
+        // Colour, to be turned back into the same grey.
+        let colour = image::DynamicImage::from(image.clone()).into_rgb8();
+        colour.save(euroc.join(eye).join("data/1403636579763555584.png")).unwrap();
+    }
+    fs::copy(torus("calib.yaml"), euroc.join("calib.yaml")).unwrap();
+
+    let calibration = torus("calib.yaml");
+    let (left, right) = (torus("left.png"), torus("right.png"));
+    let root = TORUS.path().to_str().unwrap();
+    let name = TORUS.path().file_name().unwrap().to_str().unwrap();
+    let ways: [(&[&str], PathBuf); 7] = [
+        (&["beside.png", "--calib", &calibration], "".into()),
+        (&["beside.png", "--calib", &calibration, "--layout", "side-by-side"], "".into()),
+        (&["above.png", "--calib", &calibration], "".into()),
+        (&[&right, &left, "--swap", "--jobs", "2"], "".into()),
+        (&[&left, &right, "--focal", "375", "--baseline", "60"], "".into()),
+        (&[root], name.into()),
+        (&["euroc"], "1403636579763555584".into()),
+    ];
+    for (number, (way, below)) in ways.iter().enumerate() {
+        let out = format!("out-{number}");
+        let mut args = vec!["replay", "--no-pictures", "--out", &out];
+        args.extend(*way);
+        good(folder.path(), &args);
+        assert!(results(&folder.path().join(&out).join(below)) == expected(), "{way:?}");
+    }
+}
+
+#[test]
+fn one_refused_pair_does_not_stop_the_others() {
+    let folder = TempDir::new().unwrap();
+    for pair in ["a", "b", "c"] {
+        fs::create_dir(folder.path().join(pair)).unwrap();
+        for file in ["left.png", "right.png"] {
+            fs::copy(torus(file), folder.path().join(pair).join(file)).unwrap();
+        }
+    }
+    fs::copy(torus("calib.yaml"), folder.path().join("calib.yaml")).unwrap();
+    image::GrayImage::new(320, 240).save(folder.path().join("b/left.png")).unwrap();
+    fs::write(folder.path().join("left_9.png"), "").unwrap();
+    let output = run(folder.path(), &["replay", ".", "--no-pictures", "--json", "--out", "out"]);
+    assert_eq!(output.status.code(), Some(1));
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert!(told.starts_with("error: b: no object in the left image"), "{told}");
+    assert!(told.ends_with("error: 1 of 3 pairs were refused\n"), "{told}");
+    let told = json(std::str::from_utf8(&output.stdout).unwrap());
+    let names: Vec<_> =
+        told["pairs"].as_array().unwrap().iter().map(|pair| pair["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["a", "b", "c"]);
+    assert!(told["pairs"][0]["report"]["model"]["vertices"].as_u64().unwrap() > 1000);
+    assert!(told["pairs"][1]["error"].as_str().unwrap().contains("no object"));
+    assert_eq!(told["without_partner"].as_array().unwrap().len(), 1);
+    assert!(!folder.path().join("out/b").exists());
+    assert!(results(&folder.path().join("out/c")) == results(&folder.path().join("out/a")));
+    assert!(results(&folder.path().join("out/a"))[0] == expected()[0]);
+}
+
+#[test]
+fn wrong_usage_is_2() {
+    let folder = TempDir::new().unwrap();
+    let wrong: [&[&str]; 14] = [
+        &["fly"],
+        &["replay"],
+        &["replay", "a", "b", "--omega", "4", "--mode", "paper"],
+        &["replay", "a", "b", "--omega", "2"],
+        &["replay", "a", "b", "--threshold", "256"],
+        &["replay", "a", "b", "--polarity", "grey"],
+        &["replay", "a", "b", "--resolution", "0"],
+        &["replay", "a", "b", "--focal", "750"],
+        &["replay", "a", "b", "--jobs", "0"],
+        &["replay", "a", "b", "--calib", "c", "--focal", "1", "--baseline", "1"],
+        &["demo", "cube"],
+        &["render", "torus"],
+        &["render", "torus", "--out", "x", "--size", "640"],
+        &["completions", "cmd"],
+    ];
+    for args in wrong {
+        bad(folder.path(), args, 2);
+    }
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn refusals_are_1_say_what_to_do_and_leave_nothing() {
+    let folder = TempDir::new().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let (left, right, calibration) = (torus("left.png"), torus("right.png"), torus("calib.yaml"));
+    fs::copy(&left, path("l.png")).unwrap();
+    fs::copy(&right, path("r.png")).unwrap();
+    let png = fs::read(&left).unwrap();
+    fs::write(path("cut.png"), &png[..png.len() / 2]).unwrap();
+    fs::write(path("huge.pgm"), "P5 60000 60000 255\n").unwrap();
+    fs::write(path("file"), "").unwrap();
+    fs::write(path("broken.obj"), "v 0 0 0\n").unwrap();
+    image::GrayImage::new(320, 241).save(path("tall.png")).unwrap();
+    StereoCamera::rectified(640, 480, 750.0, 60.0).write_opencv_yaml(path("large.yaml")).unwrap();
+    fs::write(path("nan.yaml"), fs::read_to_string(&calibration).unwrap().replacen("375.0", ".Nan", 1))
+        .unwrap();
+    let before = fs::read_dir(folder.path()).unwrap().count();
+    let refused: [(&[&str], &str); 17] = [
+        (&["replay", "l.png", "r.png"], "give --calib FILE"),
+        (&["replay", "l.png", "none.png"], "there is no file or folder"),
+        (&["replay", "none.png"], "there is no file or folder none.png"),
+        (&["replay", "cut.png", &right, "--calib", &calibration], "cut.png is damaged or cut short"),
+        (&["replay", "huge.pgm", &right, "--calib", &calibration], "larger than is read"),
+        (&["replay", "file", &right, "--calib", &calibration], "file is no image"),
+        (&["replay", &left, "tall.png", "--calib", &calibration], "320x240 images, but these are 320x241"),
+        (&["replay", &left, &right, "--calib", "large.yaml"], "640x480 images, but these are 320x240"),
+        (&["replay", &left, &right, "--calib", "nan.yaml"], "line 9"),
+        (&["replay", &left, &right, "--calib", "none.yaml"], "cannot read the calibration none.yaml"),
+        (&["replay", &left, &right, "--focal", "375", "--baseline", "60000"], "check the units"),
+        (&["replay", &right, &left], "left and right are swapped"),
+        (&["replay", "l.png", "--calib", &calibration], "give two"),
+        (&["replay", &left, &right, "--out", "file/below"], "cannot write file/below"),
+        (&["render", "broken.obj", "--out", "x"], "has no faces"),
+        (&["render", "torus", "--place", "auto", "--distance", "10", "--out", "x"], "behind the left camera"),
+        (&["evaluate", "none.ply", "broken.obj"], "cannot read none.ply"),
+    ];
+    for (args, told) in refused {
+        let error = bad(folder.path(), args, 1);
+        assert!(error.contains(told), "{args:?}: {error}");
+        assert_eq!(error.lines().count(), 1, "{error}");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), before, "{args:?} left files");
+    }
+}
+
+#[test]
+fn a_render_that_does_not_fit_is_told() {
+    let folder = TempDir::new().unwrap();
+    for (distance, told) in [("180", "does not fit"), ("3000", "px high")] {
+        let args = [
+            "render",
+            "torus",
+            "--place",
+            "auto",
+            "--distance",
+            distance,
+            "--size",
+            "320x240",
+            "--focal",
+            "375",
+        ];
+        let output = run(folder.path(), &[&args[..], &["--out", "pair"]].concat());
+        assert_eq!(output.status.code(), Some(0));
+        let warning = String::from_utf8(output.stderr).unwrap();
+        assert!(warning.starts_with("warning: the mesh") && warning.contains(told), "{warning}");
+    }
+}
+
+#[test]
+fn noise_follows_the_seed() {
+    let folder = TempDir::new().unwrap();
+    let left = |seed: &str, out: &str| {
+        let mut args = vec![
+            "render",
+            "sphere",
+            "--noise",
+            "5",
+            "--salt-and-pepper",
+            "0.01",
+            "--seed",
+            seed,
+            "--out",
+            out,
+        ];
+        args.extend(SMALL);
+        good(folder.path(), &args);
+        ["left.png", "right.png"].map(|name| fs::read(folder.path().join(out).join(name)).unwrap())
+    };
+    let [first, again, other] = [left("1", "a"), left("1", "b"), left("2", "c")];
+    assert!(first == again && first != other && first[0] != first[1]);
+}
+
+#[test]
+fn nobody_listening_is_no_failure() {
+    let folder = TempDir::new().unwrap();
+    let program = Command::cargo_bin("host").unwrap().get_program().to_owned();
+    for args in [&["completions", "bash"][..], &["--help"], &["replay", "a", "b"]] {
+        let mut child = std::process::Command::new(&program)
+            .current_dir(folder.path())
+            .args(args)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        drop((child.stdout.take(), child.stderr.take()));
+        let code = child.wait().unwrap().code();
+        assert!(matches!(code, Some(0 | 1)), "{args:?}: {code:?}");
+    }
+}
+
+#[test]
+fn help_shows_how() {
+    for args in [
+        &["--help"][..],
+        &["replay", "--help"],
+        &["demo", "--help"],
+        &["render", "--help"],
+        &["evaluate", "--help"],
+    ] {
+        assert!(good(Path::new("."), args).contains("Examples:"), "{args:?}");
+    }
+    assert_eq!(good(Path::new("."), &["--version"]), concat!("host ", env!("CARGO_PKG_VERSION"), "\n"));
+}
