@@ -15,7 +15,7 @@
 //! way can be seen by an [`Observer`]. Integers only: the same input gives the same bits everywhere.
 
 use crate::bitmap::{Bitmap, Grey, Plane, Size, Word};
-use crate::fixed::{ONE, PX, UNIT, div_round};
+use crate::fixed::{ONE, PX, UNIT, div_round, saturate};
 use crate::limits::{CapacityError, MAX_SIDE, push};
 use crate::point::{Pixel, PixelPoint};
 use crate::stage::binarise::{self, Histogram, Polarity, Threshold, Tone};
@@ -557,7 +557,7 @@ fn follow_curves(eye: &mut EyeMemory<'_>, scratch: &mut Scratch<'_>) -> Result<(
 /// Gates that look at both views; notes the vertical offset.
 fn compare([left, right]: &[EyeFigures; 2], gates: &mut Gates) -> Result<(), Finding> {
     gates.outcome.areas = [left.area, right.area];
-    let ratio = div_round(i64::from(right.area) * i64::from(ONE), i64::from(left.area)) as i32;
+    let ratio = saturate(div_round(i64::from(right.area) * i64::from(ONE), i64::from(left.area)));
     if !AREA_RATIO.contains(&ratio) {
         gates.meet(Finding::AreasDiffer(ratio))?;
     }
@@ -587,16 +587,17 @@ fn match_views(
 ) -> Result<(), Finding> {
     let [left, right] = &mut memory.eyes;
     let offset = gates.outcome.vertical_offset;
-    let rows = |first: usize| first.min(size.height + 1);
     for (eye, side, offset) in [(&mut *left, Side::Left, 0), (&mut *right, Side::Right, offset)] {
-        let first = rows(eye.rows.len());
-        row_crossings(eye.contour, eye.loops, offset, &mut eye.rows[..first], eye.crossings)?;
-        let rows = Rows { first: &eye.rows[..first], crossings: eye.crossings };
+        let limit = eye.rows.len();
+        let first =
+            eye.rows.get_mut(..=size.height).ok_or(CapacityError { what: "ends of rows", limit })?;
+        row_crossings(eye.contour, eye.loops, offset, first, eye.crossings)?;
+        let rows = Rows { first, crossings: eye.crossings };
         convex_hull(contour_extents(eye.contour, rows, offset), eye.hull)?;
         observer.saw(Some(side), Product::Hull(eye.hull));
     }
-    let left_rows = Rows { first: &left.rows[..rows(left.rows.len())], crossings: left.crossings };
-    let right_rows = Rows { first: &right.rows[..rows(right.rows.len())], crossings: right.crossings };
+    let left_rows = Rows { first: &left.rows[..=size.height], crossings: left.crossings };
+    let right_rows = Rows { first: &right.rows[..=size.height], crossings: right.crossings };
 
     let plane = seed(left.hull, right.hull, left_rows, right_rows, gates, observer)?;
     let disparity = plane.level + settings.optics.disparity_offset;
