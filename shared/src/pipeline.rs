@@ -115,7 +115,7 @@ pub enum Finding {
         /// Of the right image, px.
         right: (usize, usize),
     },
-    /// No component of 64 px; the area of the largest.
+    /// No component of 64 px, or no contrast at all; the area of the largest.
     NoObject(Side, u32),
     /// The object covers most of the image, in percent.
     FillsImage(Side, u32),
@@ -129,11 +129,13 @@ pub enum Finding {
     TooLow(Side, u32),
     /// The hull is too flat to be cut: row extents are used instead.
     FlatHull,
-    /// Another shift of the hull has as small an e_omega: the rows decide. The shift picked.
+    /// Another shift of the hull has a smaller e_omega, but not by much: the rows decide. That shift.
     Ambiguous(usize),
-    /// The hulls are no affine images of each other: their mean residual, 1/256 px.
+    /// The hulls are no affine images of each other, or are so by another shift than that of the rows: their
+    /// mean residual, 1/256 px.
     NotAffine(i32),
-    /// The object's median disparity is negative, 1/256 px: the eyes are swapped.
+    /// The object's disparity, 1/256 px, is negative or next to nothing: the eyes are swapped, or one view
+    /// is mirrored.
     SwappedEyes(i32),
     /// Top and bottom of the object differ between the views by these rows, 1/256 px.
     NotRectified {
@@ -156,6 +158,8 @@ impl From<CapacityError> for Finding {
     }
 }
 
+/// Least difference of the mean grey values on both sides of Otsu's level: below it, there is but one side.
+const MIN_CONTRAST: u64 = 8;
 /// Fewest pixels of an object.
 const MIN_AREA: u32 = 64;
 /// An object that covers more of the image than this is the background, percent.
@@ -174,8 +178,14 @@ const MIN_OFFSET: i32 = PX / 8;
 /// Unmatched share that warns and that refuses, in 1/65536.
 const UNMATCHED_WARNS: i32 = ONE * 15 / 100;
 const UNMATCHED_REFUSES: i32 = ONE / 4;
-/// Mean distance of the hull's vertices from the disparity plane that refuses, 1/256 px.
-const MAX_RESIDUAL: i32 = 5 * PX;
+/// Mean distance of the cut hull's vertices from the disparity plane that refuses: this part of the hull's
+/// mean width and height, and a pixel at least.
+const MAX_RESIDUAL: i32 = ONE / 50;
+/// An e_omega that is smaller by this at another shift is no tie but a contradiction, in 1/65536.
+const MAX_TIE: u32 = ONE as u32;
+/// An object nearer to infinity than this is not where it seems: the eyes are swapped or a view is
+/// mirrored, 1/256 px.
+const MIN_DISPARITY: i32 = 2 * PX;
 /// The paper's reduced hulls have at most this many vertices: n^3 triples are looked at.
 const PAPER_VERTICES: usize = 24;
 
@@ -429,6 +439,9 @@ fn see(
     let level = settings.threshold.level(&histogram);
     let tone = settings.polarity.tone(grey, level);
     saw(Product::Threshold(grey, &histogram, level, tone));
+    if settings.threshold == Threshold::Otsu && contrast(&histogram, level) < MIN_CONTRAST {
+        gates.meet(Finding::NoObject(side, 0))?;
+    }
 
     let mut mask = binarise::binarise(grey, level, tone, eye.mask)?;
     let components = clean::keep_largest(&mut mask, scratch.words)?;
@@ -483,6 +496,16 @@ fn see(
         saw(Product::Curves(eye.branches, eye.controls));
     }
     Ok(EyeFigures { area, top, bottom })
+}
+
+/// Difference of the mean grey values above the level and up to it; 0 when one side is empty.
+fn contrast(histogram: &Histogram, level: u8) -> u64 {
+    let (low, high) = histogram.split_at(usize::from(level) + 1);
+    let mean = |bins: &[u32], first: usize| {
+        let sum = (first as u64..).zip(bins).map(|(value, n)| value * u64::from(*n)).sum::<u64>();
+        sum.checked_div(bins.iter().map(|n| u64::from(*n)).sum())
+    };
+    mean(high, low.len()).zip(mean(low, 0)).map_or(0, |(high, low)| high - low)
 }
 
 /// Hand each edge of the graph, and each isolated node, to `take` with its free ends, nodes and closure.
@@ -601,7 +624,7 @@ fn match_views(
 
     let plane = seed(left.hull, right.hull, left_rows, right_rows, gates, observer)?;
     let disparity = plane.level + settings.optics.disparity_offset;
-    if disparity < 0 {
+    if disparity < MIN_DISPARITY {
         gates.meet(Finding::SwappedEyes(disparity))?;
     }
     let statistics = match_rows(
@@ -661,14 +684,16 @@ fn seed(
     let cuts = if left.len() < 4 || right.len() < 4 { None } else { match_cuts(left, right) };
     let plane = if let Some(cuts) = &cuts {
         observer.saw(None, Product::Cuts(cuts));
-        if cuts.shift != 0 {
+        let contradicted = cuts.errors[0] - cuts.errors[cuts.shift] > MAX_TIE;
+        if cuts.shift != 0 && !contradicted {
             gates.meet(Finding::Ambiguous(cuts.shift))?;
         }
         let seen = cuts.left.iter().zip(&cuts.right).map(|(a, b)| observation(*a, b.u));
         let plane = ImagePlane::fit(seen.clone());
         let off = |o: Observation| plane.map_or(0, |p| i64::from((o.value - p.at(o.at)).abs()));
         let residual = (seen.map(off).sum::<i64>() / cuts.left.len() as i64) as i32;
-        if residual > MAX_RESIDUAL {
+        let allowed = (i64::from(mean_side(&cuts.left)) * i64::from(MAX_RESIDUAL)) >> 16;
+        if contradicted || i64::from(residual) > allowed.max(i64::from(PX)) {
             gates.meet(Finding::NotAffine(residual))?;
         }
         plane
@@ -686,6 +711,14 @@ fn seed(
     let plane = plane.ok_or(Finding::NoMap)?;
     gates.outcome.plane = plane;
     Ok(plane)
+}
+
+/// Mean of width and height of the points' box, 1/256 px.
+fn mean_side(points: &[PixelPoint]) -> i32 {
+    let span = |of: fn(&PixelPoint) -> i32| {
+        points.iter().map(of).max().unwrap_or(0) - points.iter().map(of).min().unwrap_or(0)
+    };
+    (span(|p| p.u) + span(|p| p.v)) / 2
 }
 
 /// The disparity that a point would have if it were the right view's at column `u`.

@@ -8,6 +8,7 @@ use host::shape::Shape;
 use image::{GrayImage, imageops};
 use oracle::scene::{camera, pair};
 use shared::fixed::{ONE, PX};
+use shared::point::PixelPoint;
 use shared::pipeline::{Finding, Observer, Product, Side};
 use shared::stage::correspond::CutMatch;
 use shared::stage::plane::{ImagePlane, Observation};
@@ -55,7 +56,15 @@ fn line(name: &str, left: &GrayImage, right: &GrayImage, camera: &StereoCamera) 
         (e(c.errors[0]), e(c.errors[c.shift]), c.shift, residual(&c))
     });
     let unmatched = seen.unmatched.unwrap_or(f64::NAN);
-    println!("{name:28} residual {residual:6.2}  e0 {e0:8.2}  least {least:7.2} at {shift:2}  unmatched {unmatched:.3}  {verdict}");
+    let (width, height) = seen.cuts.map_or((1.0, 1.0), |c| {
+        let span = |f: fn(&PixelPoint) -> i32| {
+            let all = || c.left.iter().map(f);
+            f64::from(all().max().unwrap_or(0) - all().min().unwrap_or(0)) / f64::from(PX)
+        };
+        (span(|p| p.u), span(|p| p.v))
+    });
+    let (by_height, by_both) = (100.0 * residual / height, 200.0 * residual / (width + height));
+    println!("{name:28} residual {residual:6.2} px {by_height:5.2} {by_both:5.2} %  e0 {e0:8.2}  least {least:7.2} at {shift:2}  unmatched {unmatched:.3}  {verdict}");
 }
 
 fn lines(name: &str, [left, right]: &[GrayImage; 2], camera: &StereoCamera) {

@@ -110,7 +110,15 @@ fn pictures_of_no_size_or_of_two_sizes_are_refused() {
             for value in [0, 255] {
                 let blank = picture(width, height, |_, _| value);
                 let found = answer(&mut core, &[blank.clone(), blank], &settings);
-                assert!(matches!(found, Err(Finding::NoObject(..))), "{width}x{height}: {found:?}");
+                let full = value == 255 && width * height >= 64;
+                let refused = match found {
+                    Err(Finding::NoObject(..)) => !full,
+                    Err(Finding::FillsImage(_, 100)) => full,
+                    // The paper's way warns of it and goes on to a hull without area.
+                    Err(Finding::NoMap) => full,
+                    _ => false,
+                };
+                assert!(refused, "{width}x{height} of {value}: {found:?}");
             }
         }
         let pair = [picture(30, 20, |_, _| 9), picture(20, 30, |_, _| 9)];
@@ -118,13 +126,13 @@ fn pictures_of_no_size_or_of_two_sizes_are_refused() {
     }
 }
 
-/// A hand of five fingers with a hole in the palm: every list gets more than a few entries.
+/// A hand of five fingers with holes in the palm: every list gets more than a few entries.
 fn hand(shift: usize) -> Picture {
     picture(150, 120, |u, v| {
         let u = u + shift;
         let finger = v > 12 && v < 70 && (30..120).contains(&u) && u % 18 < 9 + v / 40;
         let palm = (70..110).contains(&v) && (30..120).contains(&u);
-        let hole = (84..96).contains(&v) && (60..80).contains(&u);
+        let hole = (84..96).contains(&v) && u % 20 < 10 && (40..110).contains(&u);
         if (finger || palm) && !hole { 210 } else { 12 }
     })
 }

@@ -7,10 +7,10 @@ use host::render::Noise;
 use host::shape::Shape;
 use host::view::Pinhole;
 use image::{GrayImage, imageops};
-use oracle::scene::{Pair, draw, drawn_pair, model, moved_down, pair};
+use oracle::scene::{Pair, drawn_pair, model, pair, right_moved_down, views};
 use shared::fixed::{ONE, PX};
 use shared::pipeline::{Finding, Side};
-use shared::stage::binarise::Polarity;
+use shared::stage::binarise::{Polarity, Threshold};
 
 fn outcome(pair: &Pair) -> Result<Reconstruction, Refusal> {
     model(pair, &Options::default())
@@ -60,7 +60,10 @@ fn an_object_over_most_of_the_image_is_the_background() {
     let dark_object = Options { polarity: Polarity::DarkObject, ..Options::default() };
     assert!(model(&dark, &dark_object).is_ok(), "what the sentence proposes helps");
     let full = [0, 1].map(|_| GrayImage::from_pixel(320, 240, image::Luma([200])));
-    refusal(&full, &["covers 100 %"]);
+    let below = Options { threshold: Threshold::Fixed(100), ..Options::default() };
+    let found = model(&full, &below).unwrap_err().to_string();
+    assert!(found.contains("covers 100 %"), "{found}");
+    refusal(&full, &["no object"]);
 }
 
 #[test]
@@ -98,9 +101,10 @@ fn touching_the_border_is_flagged_and_modelled() {
     let model = outcome(&[left, right]).unwrap();
     assert_eq!(model.outcome.frontier_offsets[0], model.outcome.frontier_offsets[1]);
     assert!((model.outcome.vertical_offset - PX).abs() < PX / 8, "{:?}", model.outcome.vertical_offset);
-    // At the left side of the left image only.
-    let found = warnings(&drawn_pair(-10.0, 0.0, |_, _| false).map(|_| draw(320, 240, disc(20.0, 120.0, 40.0))));
+    // At the right side of the left image only.
+    let found = warnings(&drawn_pair(40.0, 0.0, disc(300.0, 120.0, 40.0)));
     assert!(found.contains(&Finding::TouchesBorder(Side::Left)), "{found:?}");
+    assert!(!found.contains(&Finding::TouchesBorder(Side::Right)), "{found:?}");
 }
 
 #[test]
@@ -137,9 +141,9 @@ fn error(shape: Shape, model: &Reconstruction) -> f64 {
 
 #[test]
 fn a_vertical_offset_is_mended_up_to_three_pixels() {
-    let [left, right] = pair(Shape::Torus, 2);
+    let [left, _] = pair(Shape::Torus, 2);
     for by in [0.0, 0.25, 0.5, -0.5, 1.0, 2.0, -2.0] {
-        let model = outcome(&[left.clone(), moved_down(&right, by)]).unwrap();
+        let model = outcome(&[left.clone(), right_moved_down(Shape::Torus, 2, by)]).unwrap();
         let found = f64::from(model.outcome.vertical_offset) / f64::from(PX);
         assert!((found - by).abs() < 0.13, "{by} px: {found}");
         let error = error(Shape::Torus, &model);
@@ -147,7 +151,7 @@ fn a_vertical_offset_is_mended_up_to_three_pixels() {
         assert!(error < 0.3, "{by} px: error {error} %");
     }
     for by in [3.5, -4.0, 20.0] {
-        let found = refusal(&[left.clone(), moved_down(&right, by)], &["not rectified", "--calib", "top lies"]);
+        let found = refusal(&[left.clone(), right_moved_down(Shape::Torus, 2, by)], &["not rectified", "--calib", "top lies"]);
         assert!(matches!(found, Finding::NotRectified { .. }), "{found:?}");
     }
 }
@@ -171,7 +175,7 @@ fn views_23_degrees_apart_are_refused() {
     for shape in [Shape::Teapot, Shape::Mouse, Shape::Screwdriver, Shape::Block] {
         let place = Point3::new(30.0, 0.0, 450.0);
         let mut mesh = shape.mesh(1.5 * shape.cell());
-        let view = Pinhole { size: [320, 240], focal: 375.0, principal: [159.5, 119.5], ..Pinhole::pair()[0] };
+        let [view, _] = views(2);
         let left = render(&mesh, &[view]).remove(0);
         // Turntables are seldom upright in the image.
         let turn = Rotation3::from_axis_angle(
@@ -199,31 +203,62 @@ fn an_outline_without_counterpart_is_refused() {
     assert!(matches!(found, Finding::Unmatched(share) if share > ONE / 4));
 }
 
-/// Which shapes show when the right view is a mirror image: those without a mirror plane of their own.
+/// A shape of its own mirror image shows only in where it seems to be: at infinity.
 #[test]
 fn a_mirrored_right_view_is_refused() {
-    for shape in [Shape::Capsule, Shape::TorusTilt, Shape::Screwdriver, Shape::Teapot, Shape::Mouse, Shape::Block] {
-        let [left, right] = pair(shape, 2);
-        match outcome(&[left, imageops::flip_horizontal(&right)]) {
-            Err(refusal) => println!("{shape} mirrored: {refusal}"),
-            Ok(model) => println!("{shape} mirrored: MODEL {:?}", model.outcome.findings),
+    for shape in Shape::ALL {
+        for noise in [false, true] {
+            let [left, right] = if noise { noisy(shape) } else { pair(shape, 2) };
+            let symmetric = [Shape::Sphere, Shape::Torus, Shape::TorusTilt].contains(&shape);
+            let found = refusal(&[left, imageops::flip_horizontal(&right)], &["; "]);
+            println!("{shape} mirrored: {found:?}");
+            match found {
+                Finding::SwappedEyes(disparity) => assert!(symmetric && disparity.abs() < 2 * PX, "{shape}"),
+                Finding::NotAffine(_) => assert!(!symmetric, "{shape}"),
+                other => panic!("{shape}: {other:?}"),
+            }
         }
     }
 }
 
+fn noisy(shape: Shape) -> Pair {
+    let mut pair = pair(shape, 2);
+    for (image, seed) in pair.iter_mut().zip(1..) {
+        Noise { sigma: 20.0, salt_and_pepper: 0.02, seed }.apply(image);
+    }
+    pair
+}
+
+/// The least e_omega is at the shift of the rows, but for outlines that an affine map takes into
+/// themselves: there it is a tie, which is reported, and the rows decide.
 #[test]
 fn the_right_shift_for_every_shape() {
     for shape in Shape::ALL {
-        let model = outcome(&pair(shape, 2)).unwrap();
-        let cuts = model.outcome.cuts.unwrap();
-        let ambiguous = model.outcome.findings.iter().any(|f| matches!(f, Finding::Ambiguous(_)));
-        println!("{shape}: shift {} e {:?}", cuts.shift, cuts.errors.map(|e| f64::from(e) / 65536.0));
-        assert_eq!(ambiguous, cuts.shift != 0);
-        let noisy = [(0, 1), (1, 2)].map(|(eye, seed)| {
-            let mut image = pair(shape, 2)[eye].clone();
-            Noise { sigma: 20.0, salt_and_pepper: 0.02, seed }.apply(&mut image);
+        for pair in [pair(shape, 2), noisy(shape)] {
+            let outcome = outcome(&pair).unwrap().outcome;
+            let cuts = outcome.cuts.unwrap();
+            println!("{shape}: shift {}, e_omega {} against {}", cuts.shift, cuts.errors[0], cuts.errors[cuts.shift]);
+            let ambiguous = outcome.findings.contains(&Finding::Ambiguous(cuts.shift));
+            assert_eq!(ambiguous, cuts.shift != 0);
+            let symmetric = [Shape::Sphere, Shape::Torus, Shape::TorusTilt].contains(&shape);
+            assert!(cuts.shift == 0 || symmetric, "{shape}: shift {}", cuts.shift);
+            assert!(cuts.errors[0] - cuts.errors[cuts.shift] < ONE as u32 / 4, "{shape}: no tie");
+        }
+    }
+}
+
+/// A picture of noise alone, or of a stained wall, is no object.
+#[test]
+fn noise_alone_gives_no_model() {
+    for sigma in [1.0, 5.0, 20.0, 60.0] {
+        let pair = [1, 2].map(|seed| {
+            let mut image = GrayImage::from_pixel(320, 240, image::Luma([90]));
+            Noise { sigma, salt_and_pepper: 0.01, seed }.apply(&mut image);
             image
         });
-        println!("{shape} noisy: {:?}", outcome(&noisy).map(|m| (m.outcome.cuts.unwrap().shift, m.outcome.findings)));
+        match outcome(&pair) {
+            Err(refusal) => println!("noise of {sigma}: {refusal}"),
+            Ok(model) => panic!("a model of noise of {sigma}: {:?}", model.outcome.findings),
+        }
     }
 }

@@ -213,8 +213,9 @@ pub fn match_rows(
     for v in 0..left.len() {
         let (a, b) = (left.row(v), right.row(v));
         let paired = align(a, b, plane, |i, j| record(&a[i], &b[j], left_points, right_points, matches));
-        statistics.crossings += a.len() as u32;
-        statistics.unmatched += (a.len() - paired) as u32;
+        let all = left.first[v + 1] - left.first[v];
+        statistics.crossings += all;
+        statistics.unmatched += all - paired as u32;
     }
     for l in left_loops {
         trusted.clear();

@@ -24,18 +24,22 @@ pub fn camera(scale: Scale) -> StereoCamera {
 pub fn pair(shape: Shape, scale: Scale) -> Pair {
     static SEEN: LazyLock<Mutex<BTreeMap<(&str, Scale), Pair>>> = LazyLock::new(Mutex::default);
     let mut seen = SEEN.lock().unwrap_or_else(PoisonError::into_inner);
-    seen.entry((shape.name(), scale)).or_insert_with(|| render_pair(shape, scale)).clone()
+    seen.entry((shape.name(), scale)).or_insert_with(|| views(scale).map(|view| see(shape, view))).clone()
 }
 
-fn render_pair(shape: Shape, scale: Scale) -> Pair {
-    let views = Pinhole::pair().map(|view| Pinhole {
+/// The cameras of the pictures at a scale.
+pub fn views(scale: Scale) -> [Pinhole; 2] {
+    Pinhole::pair().map(|view| Pinhole {
         size: view.size.map(|side| side / scale),
         focal: view.focal / f64::from(scale),
         principal: [639.0, 479.0].map(|last| ((last + 1.0) / f64::from(scale) - 1.0) / 2.0),
         ..view
-    });
-    let images = render(&shape.mesh(1.5 * shape.cell()), &views);
-    images.try_into().unwrap_or_else(|_| unreachable!("two views"))
+    })
+}
+
+/// What a camera sees of a shape.
+pub fn see(shape: Shape, view: Pinhole) -> GrayImage {
+    render(&shape.mesh(1.5 * shape.cell()), &[view]).remove(0)
 }
 
 /// A picture of what is inside, bright on dark, each pixel from 16 points of its square.
@@ -53,15 +57,11 @@ pub fn drawn_pair(disparity: f64, slope: f64, inside: impl Fn(f64, f64) -> bool)
     [draw(320, 240, &inside), draw(320, 240, right)]
 }
 
-/// The picture moved down by part of a pixel, linearly interpolated; the border is repeated.
-pub fn moved_down(image: &GrayImage, by: f64) -> GrayImage {
-    let row = |v: i64| v.clamp(0, i64::from(image.height()) - 1) as u32;
-    GrayImage::from_fn(image.width(), image.height(), |u, v| {
-        let from = f64::from(v) - by;
-        let (whole, part) = (from.floor(), from - from.floor());
-        let at = |v: i64| f64::from(image.get_pixel(u, row(v)).0[0]);
-        Luma([(at(whole as i64) * (1.0 - part) + at(whole as i64 + 1) * part).round() as u8])
-    })
+/// What the right eye sees of a shape when its sensor sits `by` px too high.
+pub fn right_moved_down(shape: Shape, scale: Scale, by: f64) -> GrayImage {
+    let [_, mut view] = views(scale);
+    view.principal[1] += by;
+    see(shape, view)
 }
 
 /// Reconstruct a pair of pictures of the scale that their size tells.
