@@ -134,8 +134,8 @@ pub enum Finding {
     /// The hulls are no affine images of each other, or are so by another shift than that of the rows: their
     /// mean residual, 1/256 px.
     NotAffine(i32),
-    /// The object's disparity, 1/256 px, is negative or next to nothing: the eyes are swapped, or one view
-    /// is mirrored.
+    /// The least disparity of the object's hull, 1/256 px, is negative or next to nothing: the eyes are
+    /// swapped, or one view is mirrored.
     SwappedEyes(i32),
     /// Top and bottom of the object differ between the views by these rows, 1/256 px.
     NotRectified {
@@ -408,6 +408,7 @@ pub fn run(
         let pair = |s: Size| (s.width, s.height);
         gates.meet(Finding::SizesDiffer { left: pair(left.size()), right: pair(right.size()) })?;
     }
+    forget(memory);
     let [left_eye, right_eye] = &mut memory.eyes;
     let scratch = &mut memory.scratch;
     let figures = [
@@ -420,6 +421,21 @@ pub fn run(
         Method::Paper(paper) => match_as_paper(memory, left.size(), paper, &mut gates, observer)?,
     }
     Ok(gates.outcome)
+}
+
+/// Empty the lists that one method fills and the other does not, lest an earlier run's stay there.
+fn forget(memory: &mut Memory<'_>) {
+    for eye in &mut memory.eyes {
+        eye.crossings.clear();
+        eye.samples.clear();
+        eye.branches.clear();
+        eye.controls.clear();
+    }
+    memory.matches.clear();
+    memory.balls.clear();
+    memory.depths.clear();
+    memory.boundary_pairs.clear();
+    memory.skeleton_pairs.clear();
 }
 
 /// One eye: from its picture to contour and pruned skeleton.
@@ -622,8 +638,9 @@ fn match_views(
     let left_rows = Rows { first: &left.rows[..=size.height], crossings: left.crossings };
     let right_rows = Rows { first: &right.rows[..=size.height], crossings: right.crossings };
 
-    let plane = seed(left.hull, right.hull, left_rows, right_rows, gates, observer)?;
-    let disparity = plane.level + settings.optics.disparity_offset;
+    let plane = seed((left.hull, right.hull), (left_rows, right_rows), size.width, gates, observer)?;
+    let least = left.hull.iter().map(|p| plane.at(*p)).min().unwrap_or(plane.level);
+    let disparity = least.saturating_add(settings.optics.disparity_offset);
     if disparity < MIN_DISPARITY {
         gates.meet(Finding::SwappedEyes(disparity))?;
     }
@@ -674,24 +691,28 @@ fn contour_extents(points: &[ContourPoint], rows: Rows<'_>, offset: i32) -> impl
 
 /// The disparity plane from the matched hulls, or from the rows' extents where a hull cannot be cut.
 fn seed(
-    left: &[PixelPoint],
-    right: &[PixelPoint],
-    left_rows: Rows<'_>,
-    right_rows: Rows<'_>,
+    (left, right): (&[PixelPoint], &[PixelPoint]),
+    (left_rows, right_rows): (Rows<'_>, Rows<'_>),
+    width: usize,
     gates: &mut Gates,
     observer: &mut impl Observer,
 ) -> Result<ImagePlane, Finding> {
     let cuts = if left.len() < 4 || right.len() < 4 { None } else { match_cuts(left, right) };
     let plane = if let Some(cuts) = &cuts {
         observer.saw(None, Product::Cuts(cuts));
-        let contradicted = cuts.errors[0] - cuts.errors[cuts.shift] > MAX_TIE;
+        // Where the image ends, neither hull says anything of the object.
+        let inside = |p: PixelPoint| (0..(width as i32 - 1) * PX).contains(&p.u);
+        let whole = |&(a, b): &(PixelPoint, PixelPoint)| inside(a) && inside(b);
+        let pairs = cuts.left.into_iter().zip(cuts.right).filter(whole);
+        let cut_off = pairs.clone().count() < cuts.left.len();
+        let contradicted = !cut_off && cuts.errors[0] - cuts.errors[cuts.shift] > MAX_TIE;
         if cuts.shift != 0 && !contradicted {
             gates.meet(Finding::Ambiguous(cuts.shift))?;
         }
-        let seen = cuts.left.iter().zip(&cuts.right).map(|(a, b)| observation(*a, b.u));
+        let seen = pairs.map(|(a, b)| observation(a, b.u));
         let plane = ImagePlane::fit(seen.clone());
         let off = |o: Observation| plane.map_or(0, |p| i64::from((o.value - p.at(o.at)).abs()));
-        let residual = (seen.map(off).sum::<i64>() / cuts.left.len() as i64) as i32;
+        let residual = div_round(seen.clone().map(off).sum(), seen.count() as i64) as i32;
         let allowed = (i64::from(mean_side(&cuts.left)) * i64::from(MAX_RESIDUAL)) >> 16;
         if contradicted || i64::from(residual) > allowed.max(i64::from(PX)) {
             gates.meet(Finding::NotAffine(residual))?;

@@ -132,7 +132,7 @@ impl Core {
         }
         macro_rules! slice {
             ($name:literal, $all:expr) => {{
-                let keep = if missing == $name { $all.len() / 40 } else { $all.len() };
+                let keep = if missing == $name { 3.min($all.len()) } else { $all.len() };
                 &mut $all[..keep]
             }};
         }

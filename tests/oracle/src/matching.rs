@@ -27,13 +27,19 @@ pub fn medial_radius(points: &[(At, At)], i: usize, most: f64) -> f64 {
 /// An edge of a row: where, and whether the object lies to its left.
 pub type Edge = (i32, bool);
 
-/// The least cost of any monotone alignment of two rows, by trying all of them.
-pub fn least_cost(a: &[Edge], b: &[Edge], cost: &dyn Fn(Edge, Edge) -> i32, skip: i32) -> i32 {
-    let (Some((&x, rest_a)), Some((&y, rest_b))) = (a.split_first(), b.split_first()) else {
-        return skip * (a.len() + b.len()) as i32;
+/// The cheapest monotone alignment of two rows, by trying all of them: its cost and its pairs.
+pub fn cheapest(a: &[Edge], b: &[Edge], cost: &dyn Fn(Edge, Edge) -> i32, skip: i32) -> (i32, Vec<(usize, usize)>) {
+    let (Some((x, rest_a)), Some((y, rest_b))) = (a.split_last(), b.split_last()) else {
+        return (skip * (a.len() + b.len()) as i32, Vec::new());
     };
-    let apart = least_cost(rest_a, b, cost, skip).min(least_cost(a, rest_b, cost, skip)) + skip;
-    if x.1 == y.1 { apart.min(least_cost(rest_a, rest_b, cost, skip) + cost(x, y)) } else { apart }
+    let apart = [cheapest(rest_a, b, cost, skip), cheapest(a, rest_b, cost, skip)]
+        .map(|(spent, pairs)| (spent + skip, pairs));
+    let together = (x.1 == y.1).then(|| {
+        let (spent, mut pairs) = cheapest(rest_a, rest_b, cost, skip);
+        pairs.push((rest_a.len(), rest_b.len()));
+        (spent + cost(*x, *y), pairs)
+    });
+    together.into_iter().chain(apart).min_by_key(|(spent, _)| *spent).unwrap_or_default()
 }
 
 /// Value, slope along u and slope along v at the centre of gravity: Cauchy weights of scale 1 px, six
