@@ -71,7 +71,7 @@ fn planes_are_those_of_floats() {
     let mut random = Random(4);
     let mut worst = 0.0f64;
     for case in 0..2000 {
-        let n = 3 + random.below(60) as usize;
+        let n = 12 + random.below(60) as usize;
         let (width, height) = (uniform(&mut random, 5.0, 600.0), uniform(&mut random, 5.0, 400.0));
         let (a, b, c) = (
             uniform(&mut random, -0.3, 0.3),
@@ -84,7 +84,7 @@ fn planes_are_those_of_floats() {
                 let (u, v) = (uniform(&mut random, 0.0, width), uniform(&mut random, 0.0, height));
                 let wild = if random.below(10) == 0 { 20.0 } else { 0.0 };
                 let value = a * u + b * v + c + noise * uniform(&mut random, -1.0, 1.0) + wild;
-                let weight = random.below(UNIT as u64) as i32 + 1;
+                let weight = UNIT / 4 + random.below(UNIT as u64 * 3 / 4) as i32;
                 Observation { at: at(u, v), value: (value * f64::from(PX)).round() as i32, weight }
             })
             .collect();
@@ -201,7 +201,7 @@ fn crossings_are_where_the_outline_meets_the_rows() {
             let mut expected: Vec<(f64, bool)> = Vec::new();
             for (k, p) in points.iter().enumerate() {
                 let ([u0, v0], [u1, v1]) = (px(p.at), px(points[(k + 1) % points.len()].at));
-                if (v0 < line) != (v1 < line) {
+                if (v0 <= line) != (v1 <= line) {
                     expected.push((u0 + (u1 - u0) * (line - v0) / (v1 - v0), v1 > v0));
                 }
             }
@@ -220,7 +220,7 @@ fn crossings_are_where_the_outline_meets_the_rows() {
 fn alignment_is_the_cheapest_of_all() {
     let mut random = Random(8);
     let (mut unmatched_seen, mut matched_seen) = (0, 0);
-    for _ in 0..300 {
+    for case in 0..300 {
         let mut side = |n: u64| {
             let mut u = uniform(&mut random, 20.0, 60.0);
             let mut bars = Vec::new();
@@ -231,7 +231,7 @@ fn alignment_is_the_cheapest_of_all() {
             }
             bars
         };
-        let (left, right) = (side(1 + side(1).len() as u64 % 3), side(2));
+        let (left, right) = (side(case % 3 + 1), side(2));
         let right: Vec<_> = right.iter().map(|(a, b)| (a - 10.0, b - 10.0)).collect();
         let height = 9;
         let ((points, loops), (right_points, right_loops)) = (bars(&left, height), bars(&right, height));
