@@ -155,8 +155,8 @@ pub fn reconstruct(
     if grown.cones.is_empty() {
         return Err(Refusal::Behind);
     }
-    let cell = options.cell.unwrap_or_else(|| pixel_at(&camera, &grown.cones));
-    let body = keep_largest_body(&surface(&grown.cones, cell)?);
+    let (cell, mesh) = mesh(&grown.cones, &camera, options)?;
+    let body = keep_largest_body(&mesh);
     clock.lap("surface");
     let turned = |curves: Curves| Curves {
         points: curves.points.iter().map(|p| camera.to_left_camera(*p)).collect(),
@@ -261,6 +261,35 @@ fn object_box(image: &GrayImage, side: Side, options: &Options) -> Result<PixelB
 fn pixel_at(camera: &RectifiedCamera, cones: &[RoundCone]) -> f64 {
     let depth = cones.iter().map(|c| c.centres[0].z).fold(f64::INFINITY, f64::min);
     2.0 * depth / camera.f
+}
+
+/// The surface and its cell. A wrong map of the paper's way can throw balls far off; where the user has
+/// not chosen a cell, it then gets as coarse as such a solid needs, for a model that shows the error.
+fn mesh(
+    cones: &[RoundCone],
+    camera: &RectifiedCamera,
+    options: &Options,
+) -> Result<(f64, Mesh), SurfaceError> {
+    let coarsens = options.cell.is_none() && matches!(options.mode, Mode::Paper { .. });
+    let least = if coarsens { reach(cones) / MOST_CELLS } else { 0.0 };
+    let mut cell = options.cell.unwrap_or_else(|| pixel_at(camera, cones).max(least));
+    loop {
+        match surface(cones, cell) {
+            Err(SurfaceError::TooFine { .. }) if coarsens && cell < COARSEST_MM => cell *= 4.0,
+            found => return Ok((cell, found?)),
+        }
+    }
+}
+
+/// No cell is made coarser than this, mm.
+const COARSEST_MM: f64 = 1e5;
+/// Cells from end to end of a solid whose balls fly apart.
+const MOST_CELLS: f64 = 1000.0;
+
+/// The farthest that a ball reaches from the camera, mm.
+fn reach(cones: &[RoundCone]) -> f64 {
+    let far = |c: &RoundCone| c.centres[0].coords.norm() + c.radii[0];
+    cones.iter().map(far).fold(0.0, f64::max)
 }
 
 /// The solid in rectified axes.

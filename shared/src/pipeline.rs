@@ -181,8 +181,6 @@ const UNMATCHED_REFUSES: i32 = ONE / 4;
 /// Mean distance of the cut hull's vertices from the disparity plane that refuses: this part of the hull's
 /// mean width and height, and a pixel at least.
 const MAX_RESIDUAL: i32 = ONE / 50;
-/// An e_omega that is smaller by this at another shift is no tie but a contradiction, in 1/65536.
-const MAX_TIE: u32 = ONE as u32;
 /// An object nearer to infinity than this is not where it seems: the eyes are swapped or a view is
 /// mirrored, 1/256 px.
 const MIN_DISPARITY: i32 = 2 * PX;
@@ -628,8 +626,7 @@ fn match_views(
     let offset = gates.outcome.vertical_offset;
     for (eye, side, offset) in [(&mut *left, Side::Left, 0), (&mut *right, Side::Right, offset)] {
         let limit = eye.rows.len();
-        let first =
-            eye.rows.get_mut(..=size.height).ok_or(CapacityError { what: "ends of rows", limit })?;
+        let first = eye.rows.get_mut(..=size.height).ok_or(CapacityError { what: "ends of rows", limit })?;
         row_crossings(eye.contour, eye.loops, offset, first, eye.crossings)?;
         let rows = Rows { first, crossings: eye.crossings };
         convex_hull(contour_extents(eye.contour, rows, offset), eye.hull)?;
@@ -705,9 +702,9 @@ fn seed(
         let whole = |&(a, b): &(PixelPoint, PixelPoint)| inside(a) && inside(b);
         let pairs = cuts.left.into_iter().zip(cuts.right).filter(whole);
         let cut_off = pairs.clone().count() < cuts.left.len();
-        let contradicted = !cut_off && cuts.errors[0] - cuts.errors[cuts.shift] > MAX_TIE;
-        if cuts.shift != 0 && !contradicted {
-            gates.meet(Finding::Ambiguous(cuts.shift))?;
+        let contradicted = !cut_off && cuts.shift != 0;
+        if cuts.least != 0 && !contradicted {
+            gates.meet(Finding::Ambiguous(cuts.least))?;
         }
         let seen = pairs.map(|(a, b)| observation(a, b.u));
         let plane = ImagePlane::fit(seen.clone());

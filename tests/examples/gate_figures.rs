@@ -8,8 +8,8 @@ use host::shape::Shape;
 use image::{GrayImage, imageops};
 use oracle::scene::{camera, pair};
 use shared::fixed::{ONE, PX};
-use shared::point::PixelPoint;
 use shared::pipeline::{Finding, Observer, Product, Side};
+use shared::point::PixelPoint;
 use shared::stage::correspond::CutMatch;
 use shared::stage::plane::{ImagePlane, Observation};
 
@@ -53,7 +53,7 @@ fn line(name: &str, left: &GrayImage, right: &GrayImage, camera: &StereoCamera) 
     };
     let e = |x: u32| f64::from(x) / f64::from(ONE);
     let (e0, least, shift, residual) = seen.cuts.map_or((f64::NAN, f64::NAN, 99, f64::NAN), |c| {
-        (e(c.errors[0]), e(c.errors[c.shift]), c.shift, residual(&c))
+        (e(c.errors[0]), e(c.errors[c.least]), c.least, residual(&c))
     });
     let unmatched = seen.unmatched.unwrap_or(f64::NAN);
     let (width, height) = seen.cuts.map_or((1.0, 1.0), |c| {
@@ -64,7 +64,9 @@ fn line(name: &str, left: &GrayImage, right: &GrayImage, camera: &StereoCamera) 
         (span(|p| p.u), span(|p| p.v))
     });
     let (by_height, by_both) = (100.0 * residual / height, 200.0 * residual / (width + height));
-    println!("{name:28} residual {residual:6.2} px {by_height:5.2} {by_both:5.2} %  e0 {e0:8.2}  least {least:7.2} at {shift:2}  unmatched {unmatched:.3}  {verdict}");
+    println!(
+        "{name:28} residual {residual:6.2} px {by_height:5.2} {by_both:5.2} %  e0 {e0:8.2}  least {least:7.2} at {shift:2}  unmatched {unmatched:.3}  {verdict}"
+    );
 }
 
 fn lines(name: &str, [left, right]: &[GrayImage; 2], camera: &StereoCamera) {
@@ -85,7 +87,8 @@ fn main() {
         }
     }
     for folder in std::env::args().skip(1) {
-        let mut cases: Vec<_> = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|e| e.path()).collect();
+        let mut cases: Vec<_> =
+            std::fs::read_dir(folder).into_iter().flatten().flatten().map(|e| e.path()).collect();
         cases.sort();
         for case in cases {
             let open = |name: &str| image::open(case.join(name)).map(|image| image.to_luma8());

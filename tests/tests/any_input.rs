@@ -17,14 +17,17 @@ const OPTICS: Optics = Optics { focal: 750 * PX, disparity_offset: 0 };
 /// Default and paper mode with everything that a user can choose, drawn at random.
 fn settings(random: &mut Random) -> Settings {
     let mut draw = |n: u64| random.below(n) as usize;
-    let optics =
-        [OPTICS, Optics { focal: 1, disparity_offset: 1 << 20 }, Optics { focal: 1 << 22, disparity_offset: -(1 << 20) }]
-            [draw(3)];
+    let optics = [
+        OPTICS,
+        Optics { focal: 1, disparity_offset: 1 << 20 },
+        Optics { focal: 1 << 22, disparity_offset: -(1 << 20) },
+    ][draw(3)];
     let paper = PaperMatching { omega: 1 + draw(3), threshold: [0, 3000, i32::MAX][draw(3)] };
     let chosen = if draw(2) == 0 { Settings::new(optics) } else { Settings::paper(optics, paper) };
     Settings {
         median: draw(2) == 0,
-        threshold: [Threshold::Otsu, Threshold::Fixed(100), Threshold::Fixed(0), Threshold::Fixed(255)][draw(4)],
+        threshold: [Threshold::Otsu, Threshold::Fixed(100), Threshold::Fixed(0), Threshold::Fixed(255)]
+            [draw(4)],
         polarity: [Polarity::BrightObject, Polarity::DarkObject, Polarity::Auto][draw(3)],
         thinning: [Rule::HitOrMiss, Rule::ZhangSuen, Rule::GuoHall, Rule::EdtOrdered][draw(4)],
         ..chosen
@@ -55,7 +58,11 @@ fn pictures(random: &mut Random) -> [Picture; 2] {
         10 => grey(u.abs_diff(v) < 1 + c / 8),
         11 => grey(at(u / 9, v / 9) > 120),
         12 => grey((u.abs_diff(width / 2) < 20 && v.abs_diff(height / 2) < 15) != (at(u, v) < 20)),
-        _ => 12 + (200 * usize::from(u.abs_diff(width / 2) * 2 + v.abs_diff(height / 2) < 20 + c) + at(u, v) as usize / 6).min(243) as u8,
+        _ => {
+            12 + (200 * usize::from(u.abs_diff(width / 2) * 2 + v.abs_diff(height / 2) < 20 + c)
+                + at(u, v) as usize / 6)
+                .min(243) as u8
+        }
     };
     let left = picture(width, height, draws);
     let right = picture(width, height, |u, v| if u + shift < width { draws(u + shift, v) } else { 12 });

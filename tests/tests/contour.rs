@@ -42,7 +42,11 @@ fn px(x: i32) -> f64 {
 }
 
 /// Root mean square and largest error, px, of the points that `keep` lets through.
-fn errors(points: &[ContourPoint], distance: &dyn Fn(f64, f64) -> f64, keep: impl Fn(f64, f64) -> bool) -> (f64, f64) {
+fn errors(
+    points: &[ContourPoint],
+    distance: &dyn Fn(f64, f64) -> f64,
+    keep: impl Fn(f64, f64) -> bool,
+) -> (f64, f64) {
     let kept = points.iter().map(|p| (px(p.at.u), px(p.at.v))).filter(|p| keep(p.0, p.1));
     let all: Vec<f64> = kept.map(|(u, v)| distance(u, v).abs()).collect();
     assert!(all.len() > 20);
@@ -117,7 +121,10 @@ fn ellipses_at_every_angle_and_phase() {
             }
         }
     }
-    println!("ellipses: rms {:.3} px, at most {:.3} px, normals within {:.1} degrees", worst.0, worst.1, worst.2);
+    println!(
+        "ellipses: rms {:.3} px, at most {:.3} px, normals within {:.1} degrees",
+        worst.0, worst.1, worst.2
+    );
     assert!(worst.0 < 0.05 && worst.1 < 0.2 && worst.2 < 12.0, "{worst:?}");
 }
 

@@ -19,7 +19,8 @@ fn checksum(bytes: impl IntoIterator<Item = u8>) -> u64 {
 }
 
 fn mesh_checksum(model: &Reconstruction) -> u64 {
-    let vertices = model.mesh.vertices.iter().flat_map(|p| [p.x, p.y, p.z]).flat_map(|x| x.to_bits().to_le_bytes());
+    let vertices =
+        model.mesh.vertices.iter().flat_map(|p| [p.x, p.y, p.z]).flat_map(|x| x.to_bits().to_le_bytes());
     let faces = model.mesh.faces.iter().flatten().flat_map(|i| i.to_le_bytes());
     checksum(vertices.chain(faces))
 }
@@ -56,8 +57,9 @@ fn two_runs_and_any_number_of_threads_agree() {
 
 /// A checksum of every integer that the core leaves in its memory.
 fn core_checksum(pair: &Pair, settings: &Settings) -> u64 {
-    let pictures: [Picture; 2] =
-        pair.each_ref().map(|image| image.as_raw().chunks(image.width() as usize).map(<[u8]>::to_vec).collect());
+    let pictures: [Picture; 2] = pair
+        .each_ref()
+        .map(|image| image.as_raw().chunks(image.width() as usize).map(<[u8]>::to_vec).collect());
     let mut text = String::new();
     let outcome = Core::default()
         .run([&pictures[0], &pictures[1]], settings, "", &mut (), |memory, _| {

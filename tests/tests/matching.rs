@@ -88,8 +88,10 @@ fn planes_are_those_of_floats() {
                 Observation { at: at(u, v), value: (value * f64::from(PX)).round() as i32, weight }
             })
             .collect();
-        let floats: Vec<_> =
-            seen.iter().map(|o| (px(o.at), f64::from(o.value) / f64::from(PX), f64::from(o.weight))).collect();
+        let floats: Vec<_> = seen
+            .iter()
+            .map(|o| (px(o.at), f64::from(o.value) / f64::from(PX), f64::from(o.weight)))
+            .collect();
         let (plane, naive) = (ImagePlane::fit(seen.iter().copied()).unwrap(), naive::robust_plane(&floats));
         for o in &seen {
             let off = f64::from(plane.at(o.at)) / f64::from(PX) - naive(px(o.at));
@@ -103,8 +105,9 @@ fn planes_are_those_of_floats() {
 #[test]
 fn partners_are_the_nearest() {
     let mut random = Random(5);
-    let mut points =
-        |n: usize| -> Vec<PixelPoint> { (0..n).map(|_| at(random.below(90) as f64, random.below(90) as f64)).collect() };
+    let mut points = |n: usize| -> Vec<PixelPoint> {
+        (0..n).map(|_| at(random.below(90) as f64, random.below(90) as f64)).collect()
+    };
     for n in 0..60 {
         let (left, right) = (points(40), points(n));
         let map = AffineMap::fit((0..4).map(|k| (left[k], left[(k + 1) % 4]))).unwrap();
@@ -118,7 +121,12 @@ fn partners_are_the_nearest() {
             assert!(pair.left == *l && distance(&pair.right) <= least);
         }
     }
-    let full = pair_nearest([at(0.0, 0.0); 3].into_iter(), || [at(1.0, 1.0)].into_iter(), &AffineMap::default(), &mut List::<_, 2>::new());
+    let full = pair_nearest(
+        [at(0.0, 0.0); 3].into_iter(),
+        || [at(1.0, 1.0)].into_iter(),
+        &AffineMap::default(),
+        &mut List::<_, 2>::new(),
+    );
     assert!(full.is_err());
 }
 
@@ -150,11 +158,14 @@ fn balls_are_the_largest_that_the_definition_allows() {
         assert!(balls.len() > points.len() / 3, "{} of {}", balls.len(), points.len());
         let floats: Vec<_> = points
             .iter()
-            .map(|p| (px(p.at), [f64::from(p.normal.u) / f64::from(UNIT), f64::from(p.normal.v) / f64::from(UNIT)]))
+            .map(|p| {
+                (px(p.at), [f64::from(p.normal.u) / f64::from(UNIT), f64::from(p.normal.v) / f64::from(UNIT)])
+            })
             .collect();
         for ball in &balls {
             let [grown, touched] = ball.contacts.map(|k| k as usize);
-            let (rho, naive) = (f64::from(ball.rho) / f64::from(PX), naive::medial_radius(&floats, grown, 1000.0));
+            let (rho, naive) =
+                (f64::from(ball.rho) / f64::from(PX), naive::medial_radius(&floats, grown, 1000.0));
             // The height above the tangent is cut to 1/256 px, which the radius feels by rho / height.
             assert!((rho - naive).abs() < 0.02 * naive + 0.05, "radius {rho}, by definition {naive}");
             let from = |k: usize| f64::from(ball.centre.distance(points[k].at)) / f64::from(PX);
@@ -243,8 +254,15 @@ fn alignment_is_the_cheapest_of_all() {
         let rows = Rows { first: &first, crossings: &crossings };
         let right_rows = Rows { first: &right_first, crossings: &right_crossings };
         let (mut matches, mut trusted) = (List::<_, 512>::new(), List::<Trusted, 512>::new());
-        let statistics =
-            match_rows((&points, &loops), &right_points, (rows, right_rows), &plane, &mut matches, &mut trusted).unwrap();
+        let statistics = match_rows(
+            (&points, &loops),
+            &right_points,
+            (rows, right_rows),
+            &plane,
+            &mut matches,
+            &mut trusted,
+        )
+        .unwrap();
 
         let edges = |row: &[shared::stage::rows::RowCrossing]| -> Vec<naive::Edge> {
             row.iter().map(|c| (c.u, c.downwards)).collect()

@@ -72,9 +72,8 @@ fn px(p: PixelPoint) -> [f64; 2] {
 /// Least over all wrong shifts of the largest miss of the best affine map, px.
 fn best_wrong_miss(left: &[PixelPoint], right: &[PixelPoint], shift: usize) -> f64 {
     let n = left.len();
-    let miss = |s: usize| {
-        affine(&(0..n).map(|k| (px(left[k]), px(right[(k + s) % n]))).collect::<Vec<_>>()).0
-    };
+    let miss =
+        |s: usize| affine(&(0..n).map(|k| (px(left[k]), px(right[(k + s) % n]))).collect::<Vec<_>>()).0;
     (0..n).filter(|s| *s != shift).map(miss).fold(f64::INFINITY, f64::min)
 }
 
@@ -104,7 +103,8 @@ fn the_right_correspondence_every_time() {
             let (mut a, mut b) =
                 (List::<_, 32>::from_slice(&left).unwrap(), List::<_, 32>::from_slice(&right).unwrap());
             let matched =
-                match_vertices(&mut a, &mut b, 32, PaperMatching { omega, ..PaperMatching::default() }).unwrap();
+                match_vertices(&mut a, &mut b, 32, PaperMatching { omega, ..PaperMatching::default() })
+                    .unwrap();
             if matched.partner(0, n) != shift {
                 wrong.push((n, omega));
                 continue;

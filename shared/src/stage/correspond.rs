@@ -10,8 +10,9 @@
 //!   first cut at the same six relative heights, which takes the paper's "all the vertices in both images
 //!   are distributed equally" at its word: twelve vertices, in the same order in both views. e_omega
 //!   (omega = 3, logarithms of the ratios), averaged around the hull, is then computed for each cyclic
-//!   shift. The rows of a rectified pair say that shift 0 is right; a least e_omega elsewhere is a tie of a
-//!   symmetric hull if e_omega at 0 is nearly as small, and a sign of two different shapes if not.
+//!   shift. The least picks the shift. The rows of a rectified pair say that shift 0 is right, and they
+//!   decide where e_omega at 0 is nearly as small, as it is for a symmetric hull; where it is not, the
+//!   hulls are of two different shapes.
 //! * [`match_vertices`], the paper: the hulls' own vertices, their number made equal by deleting those that
 //!   matter least, arg-min of e_omega over the pairs of quadruplets, then all sets of three vertices whose
 //!   area agrees. Vertices are ordered, so each pair of quadruplets stands for a cyclic shift. Rounded to
@@ -37,6 +38,10 @@ const OMEGA: usize = 3;
 /// (1 - cos(pi (k + 1/2) / 6)) / 2 in 1/65536: dense where the hull closes.
 const CUT_HEIGHTS: [i32; HULL_CUTS] = [1117, 9598, 24_287, 41_249, 55_938, 64_419];
 
+/// Errors that differ by no more than this tie, in 1/65536 of log2^2: noise of a sphere gives 0.1, a view
+/// that was mirrored 2 and more (docs/decisions/0005-gates.md).
+const TIE: u32 = ONE as u32;
+
 /// Two hulls, cut and compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CutMatch {
@@ -46,7 +51,9 @@ pub struct CutMatch {
     pub right: [PixelPoint; CUT_VERTICES],
     /// e_omega averaged around the hull for each cyclic shift, in 1/65536 of log2^2.
     pub errors: [u32; CUT_VERTICES],
-    /// The shift of the least error: 0 when the invariants agree with the rows.
+    /// The shift of the least error.
+    pub least: usize,
+    /// The shift picked: the one of the least error, or 0, by which the rows match, where that is a tie.
     pub shift: usize,
 }
 
@@ -71,8 +78,9 @@ pub fn match_cuts(left: &[PixelPoint], right: &[PixelPoint]) -> Option<CutMatch>
             .sum();
         (sum / CUT_VERTICES as u64).min(u64::from(u32::MAX)) as u32
     });
-    let shift = (0..CUT_VERTICES).min_by_key(|&s| errors[s]).unwrap_or(0);
-    Some(CutMatch { left, right, errors, shift })
+    let least = (0..CUT_VERTICES).min_by_key(|&s| errors[s]).unwrap_or(0);
+    let shift = if errors[0] - errors[least] <= TIE { 0 } else { least };
+    Some(CutMatch { left, right, errors, least, shift })
 }
 
 /// The hull's outline at the six heights: right side downwards, left side upwards.
@@ -168,9 +176,8 @@ pub fn match_vertices(
         let (left, right) = (&*left, &*right);
         move |k: usize| (left[k], right[(k + shift) % n])
     };
-    let agreeing = |shift: usize| {
-        triples(n).filter(|t| triple_agrees(*t, areas, &at(shift), paper.threshold)).count()
-    };
+    let agreeing =
+        |shift: usize| triples(n).filter(|t| triple_agrees(*t, areas, &at(shift), paper.threshold)).count();
     let most = (0..n).map(agreeing).max()?;
     let error = |(i, j)| e_omega((left, i), (right, j), paper.omega, Measure::Ratio);
     let (i, j) = (0..n)

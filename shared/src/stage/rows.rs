@@ -241,12 +241,7 @@ pub fn match_rows(
 }
 
 /// Align two rows of crossings in order at the least cost, and report the pairs.
-fn align(
-    a: &[RowCrossing],
-    b: &[RowCrossing],
-    plane: &ImagePlane,
-    mut pair: impl FnMut(usize, usize),
-) {
+fn align(a: &[RowCrossing], b: &[RowCrossing], plane: &ImagePlane, mut pair: impl FnMut(usize, usize)) {
     #[derive(Clone, Copy, PartialEq)]
     enum Step {
         Pair,

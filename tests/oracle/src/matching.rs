@@ -28,7 +28,12 @@ pub fn medial_radius(points: &[(At, At)], i: usize, most: f64) -> f64 {
 pub type Edge = (i32, bool);
 
 /// The cheapest monotone alignment of two rows, by trying all of them: its cost and its pairs.
-pub fn cheapest(a: &[Edge], b: &[Edge], cost: &dyn Fn(Edge, Edge) -> i32, skip: i32) -> (i32, Vec<(usize, usize)>) {
+pub fn cheapest(
+    a: &[Edge],
+    b: &[Edge],
+    cost: &dyn Fn(Edge, Edge) -> i32,
+    skip: i32,
+) -> (i32, Vec<(usize, usize)>) {
     let (Some((x, rest_a)), Some((y, rest_b))) = (a.split_last(), b.split_last()) else {
         return (skip * (a.len() + b.len()) as i32, Vec::new());
     };
