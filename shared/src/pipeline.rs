@@ -15,7 +15,7 @@
 //! way can be seen by an [`Observer`]. Integers only: the same input gives the same bits everywhere.
 
 use crate::bitmap::{Bitmap, Grey, Plane, Size, Word};
-use crate::fixed::{ONE, PX, UNIT, div_round};
+use crate::fixed::{ONE, PX, UNIT, div_round, saturate};
 use crate::limits::{CapacityError, MAX_SIDE, push};
 use crate::point::{Pixel, PixelPoint};
 use crate::stage::binarise::{self, Histogram, Polarity, Threshold, Tone};
@@ -115,7 +115,7 @@ pub enum Finding {
         /// Of the right image, px.
         right: (usize, usize),
     },
-    /// No component of 64 px; the area of the largest.
+    /// No component of 64 px, or no contrast at all; the area of the largest.
     NoObject(Side, u32),
     /// The object covers most of the image, in percent.
     FillsImage(Side, u32),
@@ -129,11 +129,13 @@ pub enum Finding {
     TooLow(Side, u32),
     /// The hull is too flat to be cut: row extents are used instead.
     FlatHull,
-    /// Another shift of the hull has as small an e_omega: the rows decide. The shift picked.
+    /// Another shift of the hull has a smaller e_omega, but not by much: the rows decide. That shift.
     Ambiguous(usize),
-    /// The hulls are no affine images of each other: their mean residual, 1/256 px.
+    /// The hulls are no affine images of each other, or are so by another shift than that of the rows: their
+    /// mean residual, 1/256 px.
     NotAffine(i32),
-    /// The object's median disparity is negative, 1/256 px: the eyes are swapped.
+    /// The least disparity of the object's hull, 1/256 px, is negative or next to nothing: the eyes are
+    /// swapped, or one view is mirrored.
     SwappedEyes(i32),
     /// Top and bottom of the object differ between the views by these rows, 1/256 px.
     NotRectified {
@@ -156,6 +158,8 @@ impl From<CapacityError> for Finding {
     }
 }
 
+/// Least difference of the mean grey values on both sides of Otsu's level: below it, there is but one side.
+const MIN_CONTRAST: u64 = 8;
 /// Fewest pixels of an object.
 const MIN_AREA: u32 = 64;
 /// An object that covers more of the image than this is the background, percent.
@@ -174,8 +178,12 @@ const MIN_OFFSET: i32 = PX / 8;
 /// Unmatched share that warns and that refuses, in 1/65536.
 const UNMATCHED_WARNS: i32 = ONE * 15 / 100;
 const UNMATCHED_REFUSES: i32 = ONE / 4;
-/// Mean distance of the hull's vertices from the disparity plane that refuses, 1/256 px.
-const MAX_RESIDUAL: i32 = 5 * PX;
+/// Mean distance of the cut hull's vertices from the disparity plane that refuses: this part of the hull's
+/// mean width and height, and a pixel at least.
+const MAX_RESIDUAL: i32 = ONE / 50;
+/// An object nearer to infinity than this is not where it seems: the eyes are swapped or a view is
+/// mirrored, 1/256 px.
+const MIN_DISPARITY: i32 = 2 * PX;
 /// The paper's reduced hulls have at most this many vertices: n^3 triples are looked at.
 pub const PAPER_VERTICES: usize = 24;
 
@@ -398,6 +406,7 @@ pub fn run(
         let pair = |s: Size| (s.width, s.height);
         gates.meet(Finding::SizesDiffer { left: pair(left.size()), right: pair(right.size()) })?;
     }
+    forget(memory);
     let [left_eye, right_eye] = &mut memory.eyes;
     let scratch = &mut memory.scratch;
     let figures = [
@@ -410,6 +419,21 @@ pub fn run(
         Method::Paper(paper) => match_as_paper(memory, left.size(), paper, &mut gates, observer)?,
     }
     Ok(gates.outcome)
+}
+
+/// Empty the lists that one method fills and the other does not, lest an earlier run's stay there.
+fn forget(memory: &mut Memory<'_>) {
+    for eye in &mut memory.eyes {
+        eye.crossings.clear();
+        eye.samples.clear();
+        eye.branches.clear();
+        eye.controls.clear();
+    }
+    memory.matches.clear();
+    memory.balls.clear();
+    memory.depths.clear();
+    memory.boundary_pairs.clear();
+    memory.skeleton_pairs.clear();
 }
 
 /// One eye: from its picture to contour and pruned skeleton.
@@ -429,6 +453,9 @@ fn see(
     let level = settings.threshold.level(&histogram);
     let tone = settings.polarity.tone(grey, level);
     saw(Product::Threshold(grey, &histogram, level, tone));
+    if settings.threshold == Threshold::Otsu && contrast(&histogram, level) < MIN_CONTRAST {
+        gates.meet(Finding::NoObject(side, 0))?;
+    }
 
     let mut mask = binarise::binarise(grey, level, tone, eye.mask)?;
     let components = clean::keep_largest(&mut mask, scratch.words)?;
@@ -483,6 +510,16 @@ fn see(
         saw(Product::Curves(eye.branches, eye.controls));
     }
     Ok(EyeFigures { area, top, bottom })
+}
+
+/// Difference of the mean grey values above the level and up to it; 0 when one side is empty.
+fn contrast(histogram: &Histogram, level: u8) -> u64 {
+    let (low, high) = histogram.split_at(usize::from(level) + 1);
+    let mean = |bins: &[u32], first: usize| {
+        let sum = (first as u64..).zip(bins).map(|(value, n)| value * u64::from(*n)).sum::<u64>();
+        sum.checked_div(bins.iter().map(|n| u64::from(*n)).sum())
+    };
+    mean(high, low.len()).zip(mean(low, 0)).map_or(0, |(high, low)| high - low)
 }
 
 /// Hand each edge of the graph, and each isolated node, to `take` with its free ends, nodes and closure.
@@ -557,7 +594,7 @@ fn follow_curves(eye: &mut EyeMemory<'_>, scratch: &mut Scratch<'_>) -> Result<(
 /// Gates that look at both views; notes the vertical offset.
 fn compare([left, right]: &[EyeFigures; 2], gates: &mut Gates) -> Result<(), Finding> {
     gates.outcome.areas = [left.area, right.area];
-    let ratio = div_round(i64::from(right.area) * i64::from(ONE), i64::from(left.area)) as i32;
+    let ratio = saturate(div_round(i64::from(right.area) * i64::from(ONE), i64::from(left.area)));
     if !AREA_RATIO.contains(&ratio) {
         gates.meet(Finding::AreasDiffer(ratio))?;
     }
@@ -587,20 +624,21 @@ fn match_views(
 ) -> Result<(), Finding> {
     let [left, right] = &mut memory.eyes;
     let offset = gates.outcome.vertical_offset;
-    let rows = |first: usize| first.min(size.height + 1);
     for (eye, side, offset) in [(&mut *left, Side::Left, 0), (&mut *right, Side::Right, offset)] {
-        let first = rows(eye.rows.len());
-        row_crossings(eye.contour, eye.loops, offset, &mut eye.rows[..first], eye.crossings)?;
-        let rows = Rows { first: &eye.rows[..first], crossings: eye.crossings };
+        let limit = eye.rows.len();
+        let first = eye.rows.get_mut(..=size.height).ok_or(CapacityError { what: "ends of rows", limit })?;
+        row_crossings(eye.contour, eye.loops, offset, first, eye.crossings)?;
+        let rows = Rows { first, crossings: eye.crossings };
         convex_hull(contour_extents(eye.contour, rows, offset), eye.hull)?;
         observer.saw(Some(side), Product::Hull(eye.hull));
     }
-    let left_rows = Rows { first: &left.rows[..rows(left.rows.len())], crossings: left.crossings };
-    let right_rows = Rows { first: &right.rows[..rows(right.rows.len())], crossings: right.crossings };
+    let left_rows = Rows { first: &left.rows[..=size.height], crossings: left.crossings };
+    let right_rows = Rows { first: &right.rows[..=size.height], crossings: right.crossings };
 
-    let plane = seed(left.hull, right.hull, left_rows, right_rows, gates, observer)?;
-    let disparity = plane.level + settings.optics.disparity_offset;
-    if disparity < 0 {
+    let plane = seed((left.hull, right.hull), (left_rows, right_rows), size.width, gates, observer)?;
+    let least = left.hull.iter().map(|p| plane.at(*p)).min().unwrap_or(plane.level);
+    let disparity = least.saturating_add(settings.optics.disparity_offset);
+    if disparity < MIN_DISPARITY {
         gates.meet(Finding::SwappedEyes(disparity))?;
     }
     let statistics = match_rows(
@@ -650,24 +688,30 @@ fn contour_extents(points: &[ContourPoint], rows: Rows<'_>, offset: i32) -> impl
 
 /// The disparity plane from the matched hulls, or from the rows' extents where a hull cannot be cut.
 fn seed(
-    left: &[PixelPoint],
-    right: &[PixelPoint],
-    left_rows: Rows<'_>,
-    right_rows: Rows<'_>,
+    (left, right): (&[PixelPoint], &[PixelPoint]),
+    (left_rows, right_rows): (Rows<'_>, Rows<'_>),
+    width: usize,
     gates: &mut Gates,
     observer: &mut impl Observer,
 ) -> Result<ImagePlane, Finding> {
     let cuts = if left.len() < 4 || right.len() < 4 { None } else { match_cuts(left, right) };
     let plane = if let Some(cuts) = &cuts {
         observer.saw(None, Product::Cuts(cuts));
-        if cuts.shift != 0 {
-            gates.meet(Finding::Ambiguous(cuts.shift))?;
+        // Where the image ends, neither hull says anything of the object.
+        let inside = |p: PixelPoint| (0..(width as i32 - 1) * PX).contains(&p.u);
+        let whole = |&(a, b): &(PixelPoint, PixelPoint)| inside(a) && inside(b);
+        let pairs = cuts.left.into_iter().zip(cuts.right).filter(whole);
+        let cut_off = pairs.clone().count() < cuts.left.len();
+        let contradicted = !cut_off && cuts.shift != 0;
+        if cuts.least != 0 && !contradicted {
+            gates.meet(Finding::Ambiguous(cuts.least))?;
         }
-        let seen = cuts.left.iter().zip(&cuts.right).map(|(a, b)| observation(*a, b.u));
+        let seen = pairs.map(|(a, b)| observation(a, b.u));
         let plane = ImagePlane::fit(seen.clone());
         let off = |o: Observation| plane.map_or(0, |p| i64::from((o.value - p.at(o.at)).abs()));
-        let residual = (seen.map(off).sum::<i64>() / cuts.left.len() as i64) as i32;
-        if residual > MAX_RESIDUAL {
+        let residual = div_round(seen.clone().map(off).sum(), seen.count() as i64) as i32;
+        let allowed = (i64::from(mean_side(&cuts.left)) * i64::from(MAX_RESIDUAL)) >> 16;
+        if contradicted || i64::from(residual) > allowed.max(i64::from(PX)) {
             gates.meet(Finding::NotAffine(residual))?;
         }
         plane
@@ -685,6 +729,14 @@ fn seed(
     let plane = plane.ok_or(Finding::NoMap)?;
     gates.outcome.plane = plane;
     Ok(plane)
+}
+
+/// Mean of width and height of the points' box, 1/256 px.
+fn mean_side(points: &[PixelPoint]) -> i32 {
+    let span = |of: fn(&PixelPoint) -> i32| {
+        points.iter().map(of).max().unwrap_or(0) - points.iter().map(of).min().unwrap_or(0)
+    };
+    (span(|p| p.u) + span(|p| p.v)) / 2
 }
 
 /// The disparity that a point would have if it were the right view's at column `u`.

@@ -10,11 +10,15 @@
 //!   first cut at the same six relative heights, which takes the paper's "all the vertices in both images
 //!   are distributed equally" at its word: twelve vertices, in the same order in both views. e_omega
 //!   (omega = 3, logarithms of the ratios), averaged around the hull, is then computed for each cyclic
-//!   shift. The rows of a rectified pair say that shift 0 is right; a least e_omega elsewhere is a tie of a
-//!   symmetric hull if e_omega at 0 is nearly as small, and a sign of two different shapes if not.
+//!   shift. The least picks the shift. The rows of a rectified pair say that shift 0 is right, and they
+//!   decide where e_omega at 0 is nearly as small, as it is for a symmetric hull; where it is not, the
+//!   hulls are of two different shapes.
 //! * [`match_vertices`], the paper: the hulls' own vertices, their number made equal by deleting those that
-//!   matter least, arg-min of e_omega over all pairs of quadruplets, then all triples of vertices whose
-//!   area agrees.
+//!   matter least, arg-min of e_omega over the pairs of quadruplets, then all sets of three vertices whose
+//!   area agrees. Vertices are ordered, so each pair of quadruplets stands for a cyclic shift. Rounded to
+//!   pixels, some quadruplet is often matched a little better by a wrong one (in 6 % of nearly regular
+//!   polygons at omega 1, 1.5 % at omega 3), so only those shifts take part under which the most sets of
+//!   three agree.
 //!
 //! * **Cost**: 12^2 feature vectors; for the paper's, n^2 omega of them and n^3 triples.
 
@@ -34,6 +38,10 @@ const OMEGA: usize = 3;
 /// (1 - cos(pi (k + 1/2) / 6)) / 2 in 1/65536: dense where the hull closes.
 const CUT_HEIGHTS: [i32; HULL_CUTS] = [1117, 9598, 24_287, 41_249, 55_938, 64_419];
 
+/// Errors that differ by no more than this tie, in 1/65536 of log2^2: noise of a sphere gives 0.1, a view
+/// that was mirrored 2 and more (docs/decisions/0005-gates.md).
+const TIE: u32 = ONE as u32;
+
 /// Two hulls, cut and compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CutMatch {
@@ -43,7 +51,9 @@ pub struct CutMatch {
     pub right: [PixelPoint; CUT_VERTICES],
     /// e_omega averaged around the hull for each cyclic shift, in 1/65536 of log2^2.
     pub errors: [u32; CUT_VERTICES],
-    /// The shift of the least error: 0 when the invariants agree with the rows.
+    /// The shift of the least error.
+    pub least: usize,
+    /// The shift picked: the one of the least error, or 0, by which the rows match, where that is a tie.
     pub shift: usize,
 }
 
@@ -68,8 +78,9 @@ pub fn match_cuts(left: &[PixelPoint], right: &[PixelPoint]) -> Option<CutMatch>
             .sum();
         (sum / CUT_VERTICES as u64).min(u64::from(u32::MAX)) as u32
     });
-    let shift = (0..CUT_VERTICES).min_by_key(|&s| errors[s]).unwrap_or(0);
-    Some(CutMatch { left, right, errors, shift })
+    let least = (0..CUT_VERTICES).min_by_key(|&s| errors[s]).unwrap_or(0);
+    let shift = if errors[0] - errors[least] <= TIE { 0 } else { least };
+    Some(CutMatch { left, right, errors, least, shift })
 }
 
 /// The hull's outline at the six heights: right side downwards, left side upwards.
@@ -81,7 +92,9 @@ fn cut(hull: &[PixelPoint]) -> Option<[PixelPoint; CUT_VERTICES]> {
     }
     let mut vertices = [PixelPoint::default(); CUT_VERTICES];
     for (k, height) in CUT_HEIGHTS.iter().enumerate() {
-        let v = top + div_round(i64::from(bottom - top) * i64::from(*height), i64::from(ONE)) as i32;
+        let down = div_round(i64::from(bottom - top) * i64::from(*height), i64::from(ONE)) as i32;
+        // Rounding must not reach the bottom of a hull of a tenth of a pixel: nothing crosses that row.
+        let v = top + down.min(bottom - top - 1);
         let (mut low, mut high) = (i32::MAX, i32::MIN);
         for (i, a) in hull.iter().enumerate() {
             let b = hull[(i + 1) % hull.len()];
@@ -101,8 +114,8 @@ fn cut(hull: &[PixelPoint]) -> Option<[PixelPoint; CUT_VERTICES]> {
 pub struct PaperMatching {
     /// Consecutive quadruplets compared: 1, 2 or 3 for four, five or six matched vertices.
     pub omega: usize,
-    /// A triple of vertices corresponds when the ratios of its area to the matched quadruplet's differ
-    /// by less than this part of it, in 1/65536.
+    /// A set of three vertices corresponds when the shares of its area in those of the hulls differ by
+    /// less than this part, in 1/65536.
     pub threshold: i32,
 }
 
@@ -158,31 +171,38 @@ pub fn match_vertices(
     }
     reduce(left, n);
     reduce(right, n);
-    let candidates = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
+    let areas = (doubled_area(left), doubled_area(right));
+    let at = |shift: usize| {
+        let (left, right) = (&*left, &*right);
+        move |k: usize| (left[k], right[(k + shift) % n])
+    };
+    let agreeing =
+        |shift: usize| triples(n).filter(|t| triple_agrees(*t, areas, &at(shift), paper.threshold)).count();
+    let most = (0..n).map(agreeing).max()?;
     let error = |(i, j)| e_omega((left, i), (right, j), paper.omega, Measure::Ratio);
-    let (i, j) = candidates.min_by_key(|&pair| error(pair))?;
-    let at = |k: usize| (left[(i + k) % n], right[(j + k) % n]);
+    let (i, j) = (0..n)
+        .filter(|&shift| agreeing(shift) == most)
+        .flat_map(|shift| (0..n).map(move |i| (i, (i + shift) % n)))
+        .min_by_key(|&pair| error(pair))?;
+    let at = at((j + n - i) % n);
     let seed = (paper.omega + 3).min(n);
-    let reference = widest_triangle(seed, &at)?;
     let agrees = |k: usize| {
-        k < seed
-            || (0..n).any(|l| {
-                (l + 1..n)
-                    .any(|m| l != k && m != k && triple_agrees([k, l, m], reference, &at, paper.threshold))
-            })
+        (k + n - i) % n < seed
+            || triples(n).any(|t| t.contains(&k) && triple_agrees(t, areas, &at, paper.threshold))
     };
     let pairs = (0..n).filter(|&k| agrees(k)).map(at);
     let map = AffineMap::fit(pairs.clone())?;
     Some(VertexMatch { quadruplets: (i, j), error: error((i, j)) >> 16, vertices: pairs.count(), map })
 }
 
-/// The doubled areas, left and right, of the largest triangle among the first `n` matched vertices.
-fn widest_triangle(n: usize, at: &impl Fn(usize) -> (PixelPoint, PixelPoint)) -> Option<(i64, i64)> {
-    let triples = (0..n).flat_map(move |a| (a + 1..n).flat_map(move |b| (b + 1..n).map(move |c| [a, b, c])));
-    triples
-        .map(|t| doubled_areas(t, at))
-        .max_by_key(|(left, right)| (*left).min(*right))
-        .filter(|(l, r)| *l > 0 && *r > 0)
+/// All sets of three of `n` vertices.
+fn triples(n: usize) -> impl Iterator<Item = [usize; 3]> {
+    (0..n).flat_map(move |a| (a + 1..n).flat_map(move |b| (b + 1..n).map(move |c| [a, b, c])))
+}
+
+/// Twice the area of a convex polygon.
+fn doubled_area(hull: &[PixelPoint]) -> i64 {
+    hull.windows(2).map(|edge| orient(hull[0], edge[0], edge[1]).abs()).sum()
 }
 
 /// Twice the area of a triple of matched vertices in both views.
@@ -191,15 +211,15 @@ fn doubled_areas(triple: [usize; 3], at: &impl Fn(usize) -> (PixelPoint, PixelPo
     (orient(a.0, b.0, c.0).abs(), orient(a.1, b.1, c.1).abs())
 }
 
-/// Whether a triple's area, measured in reference triangles, is the same in both views.
+/// Whether a triple's share of the hull's area is the same in both views.
 fn triple_agrees(
     triple: [usize; 3],
-    reference: (i64, i64),
+    areas: (i64, i64),
     at: &impl Fn(usize) -> (PixelPoint, PixelPoint),
     threshold: i32,
 ) -> bool {
     let (left, right) = doubled_areas(triple, at);
-    // left / reference.0 against right / reference.1, cross-multiplied: below 2^104.
-    let (a, b) = (i128::from(left) * i128::from(reference.1), i128::from(right) * i128::from(reference.0));
+    // left / areas.0 against right / areas.1, cross-multiplied: below 2^104.
+    let (a, b) = (i128::from(left) * i128::from(areas.1), i128::from(right) * i128::from(areas.0));
     a > 0 && b > 0 && (a - b).abs() << 16 < a.max(b) * i128::from(threshold)
 }

@@ -65,7 +65,7 @@ pub struct Trusted {
 /// How the matching went.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RowStatistics {
-    /// Crossings of the left contour with rows.
+    /// Crossings of the left contour with rows, without those on the image's border.
     pub crossings: u32,
     /// Those that found no partner.
     pub unmatched: u32,
@@ -170,11 +170,14 @@ pub struct Rows<'a> {
 impl<'a> Rows<'a> {
     /// The crossings of a row, at most [`ROW_CROSSINGS`].
     pub fn row(&self, v: usize) -> &'a [RowCrossing] {
+        let row = self.all(v);
+        &row[..row.len().min(ROW_CROSSINGS)]
+    }
+
+    /// All crossings of a row.
+    fn all(&self, v: usize) -> &'a [RowCrossing] {
         match (self.first.get(v), self.first.get(v + 1)) {
-            (Some(&a), Some(&b)) => {
-                let row = self.crossings.get(a as usize..b as usize).unwrap_or(&[]);
-                &row[..row.len().min(ROW_CROSSINGS)]
-            }
+            (Some(&a), Some(&b)) => self.crossings.get(a as usize..b as usize).unwrap_or(&[]),
             _ => &[],
         }
     }
@@ -212,9 +215,16 @@ pub fn match_rows(
     let mut statistics = RowStatistics::default();
     for v in 0..left.len() {
         let (a, b) = (left.row(v), right.row(v));
-        let paired = align(a, b, plane, |i, j| record(&a[i], &b[j], left_points, right_points, matches));
-        statistics.crossings += a.len() as u32;
-        statistics.unmatched += (a.len() - paired) as u32;
+        let mut known = 0;
+        align(a, b, plane, |i, j| {
+            known += u32::from(!left_points[a[i].index as usize].border);
+            record(&a[i], &b[j], left_points, right_points, matches);
+        });
+        // Where either image ends, a missing partner says nothing.
+        let edges = left.all(v).iter().filter(|c| !left_points[c.index as usize].border).count() as u32;
+        let cut_off = right.all(v).iter().filter(|c| right_points[c.index as usize].border).count() as u32;
+        statistics.crossings += edges;
+        statistics.unmatched += (edges - known).saturating_sub(cut_off);
     }
     for l in left_loops {
         trusted.clear();
@@ -230,13 +240,8 @@ pub fn match_rows(
     Ok(statistics)
 }
 
-/// Align two rows of crossings in order at the least cost, report the pairs, return their number.
-fn align(
-    a: &[RowCrossing],
-    b: &[RowCrossing],
-    plane: &ImagePlane,
-    mut pair: impl FnMut(usize, usize),
-) -> usize {
+/// Align two rows of crossings in order at the least cost, and report the pairs.
+fn align(a: &[RowCrossing], b: &[RowCrossing], plane: &ImagePlane, mut pair: impl FnMut(usize, usize)) {
     #[derive(Clone, Copy, PartialEq)]
     enum Step {
         Pair,
@@ -267,18 +272,17 @@ fn align(
             (cost[j + 1], steps[i + 1][j + 1], diagonal) = (best, step, above);
         }
     }
-    let (mut i, mut j, mut paired) = (a.len(), b.len(), 0);
+    let (mut i, mut j) = (a.len(), b.len());
     while i > 0 && j > 0 {
         match steps[i][j] {
             Step::Pair => {
-                (i, j, paired) = (i - 1, j - 1, paired + 1);
+                (i, j) = (i - 1, j - 1);
                 pair(i, j);
             }
             Step::SkipLeft => i -= 1,
             Step::SkipRight => j -= 1,
         }
     }
-    paired
 }
 
 /// Note a pair of crossings at the nearer point of the left contour.

@@ -1,6 +1,9 @@
 //! Independent oracles: naive twins, shapes with known truth, a mesh checker.
 
+pub mod core;
 pub mod graph;
+pub mod matching;
 pub mod mesh_checker;
 pub mod nurbs;
 pub mod raster;
+pub mod scene;

@@ -1,0 +1,226 @@
+//! The core on plain pictures, with memory in which any one part can be too short.
+
+use heapless::Vec as List;
+use shared::bitmap::{Grey, Size, Word};
+use shared::pipeline::{self, Branch, EyeMemory, Finding, Memory, Observer, Outcome, Scratch, Settings};
+use shared::point::{Pixel, PixelPoint};
+use shared::stage::branch::{Ball, Sample};
+use shared::stage::contour::{ContourLoop, ContourPoint, EdgeCrossing};
+use shared::stage::depth::BallDepth;
+use shared::stage::distance::{Parabola, scratch_parabolas};
+use shared::stage::graph::{Edge, Graph, Member, Node};
+use shared::stage::medial::MedialBall;
+use shared::stage::nearest::Pair;
+use shared::stage::nurbs::{Control, MAX_CONTROLS};
+use shared::stage::prune::Tip;
+use shared::stage::rows::{ContourMatch, RowCrossing, Trusted};
+use shared::stage::thinning::scratch_order;
+
+/// `picture[v][u]`: a grey value.
+pub type Picture = Vec<Vec<u8>>;
+
+/// The parts of one eye's memory, then those that both eyes share.
+pub const PARTS: [&str; 30] = [
+    "mask",
+    "skeleton",
+    "contour",
+    "loops",
+    "hull",
+    "crossings",
+    "rows",
+    "nodes",
+    "edges",
+    "path",
+    "members",
+    "samples",
+    "branches",
+    "controls",
+    "grey",
+    "words",
+    "plane",
+    "parabolas",
+    "order",
+    "cracks",
+    "tips",
+    "trusted",
+    "points",
+    "entries",
+    "sides",
+    "matches",
+    "balls",
+    "depths",
+    "boundary pairs",
+    "skeleton pairs",
+];
+
+#[derive(Default)]
+struct EyeLists<const N: usize> {
+    contour: Box<List<ContourPoint, N>>,
+    loops: Box<List<ContourLoop, N>>,
+    hull: Box<List<PixelPoint, N>>,
+    crossings: Box<List<RowCrossing, N>>,
+    nodes: Box<List<Node, N>>,
+    edges: Box<List<Edge, N>>,
+    path: Box<List<Pixel, N>>,
+    members: Box<List<Member, N>>,
+    samples: Box<List<Sample, N>>,
+    branches: Box<List<Branch, N>>,
+    controls: Box<List<Control, N>>,
+}
+
+#[derive(Default)]
+struct Lists<const N: usize> {
+    eyes: [EyeLists<N>; 2],
+    cracks: Box<List<EdgeCrossing, N>>,
+    tips: Box<List<Tip, N>>,
+    trusted: Box<List<Trusted, N>>,
+    points: Box<List<Ball, N>>,
+    matches: Box<List<ContourMatch, N>>,
+    balls: Box<List<MedialBall, N>>,
+    depths: Box<List<BallDepth, N>>,
+    boundary_pairs: Box<List<Pair, N>>,
+    skeleton_pairs: Box<List<Pair, N>>,
+}
+
+#[derive(Default)]
+struct Slices {
+    masks: [Vec<Word>; 2],
+    skeletons: [Vec<Word>; 2],
+    rows: [Vec<u32>; 2],
+    grey: Vec<u8>,
+    words: Vec<Word>,
+    plane: Vec<u16>,
+    parabolas: Vec<Parabola>,
+    order: Vec<u32>,
+    entries: Vec<i64>,
+    sides: Vec<[i64; 4]>,
+}
+
+impl Slices {
+    fn fit(&mut self, size: Size) {
+        for words in self.masks.iter_mut().chain(&mut self.skeletons) {
+            words.resize(size.words(), 0x55);
+        }
+        self.rows.iter_mut().for_each(|rows| rows.resize(size.height + 1, 7));
+        self.grey.resize(size.pixels(), 7);
+        self.words.resize(2 * size.words(), 0x55);
+        self.plane.resize(size.pixels(), 7);
+        self.parabolas.resize(scratch_parabolas(size.width), Parabola::default());
+        self.order.resize(scratch_order(size.pixels(), u16::MAX), 7);
+        self.entries.resize(7 * MAX_CONTROLS, 7);
+        self.sides.resize(MAX_CONTROLS, [7; 4]);
+    }
+}
+
+/// Memory for pictures of up to some thousand contour points, used again and again as it was left.
+#[derive(Default)]
+pub struct Core {
+    long: Lists<16384>,
+    short: Lists<3>,
+    slices: Slices,
+}
+
+impl Core {
+    /// All memory, but for the part named, of which there is as good as none.
+    pub fn lend(&mut self, size: Size, missing: &str) -> Memory<'_> {
+        let Self { long, short, slices } = self;
+        slices.fit(size);
+        macro_rules! list {
+            ($name:literal, $long:expr, $short:expr) => {
+                if missing == $name { &mut *$short } else { &mut *$long }
+            };
+        }
+        macro_rules! slice {
+            ($name:literal, $all:expr) => {{
+                let keep = if missing == $name { 3.min($all.len()) } else { $all.len() };
+                &mut $all[..keep]
+            }};
+        }
+        let [left, right] = &mut long.eyes;
+        let [short_left, short_right] = &mut short.eyes;
+        let [left_mask, right_mask] = &mut slices.masks;
+        let [left_skeleton, right_skeleton] = &mut slices.skeletons;
+        let [left_rows, right_rows] = &mut slices.rows;
+        macro_rules! eye {
+            ($long:expr, $short:expr, $mask:expr, $skeleton:expr, $rows:expr) => {
+                EyeMemory {
+                    mask: slice!("mask", $mask),
+                    skeleton: slice!("skeleton", $skeleton),
+                    rows: slice!("rows", $rows),
+                    contour: list!("contour", $long.contour, $short.contour),
+                    loops: list!("loops", $long.loops, $short.loops),
+                    hull: list!("hull", $long.hull, $short.hull),
+                    crossings: list!("crossings", $long.crossings, $short.crossings),
+                    graph: Graph {
+                        nodes: list!("nodes", $long.nodes, $short.nodes),
+                        edges: list!("edges", $long.edges, $short.edges),
+                        path: list!("path", $long.path, $short.path),
+                        members: list!("members", $long.members, $short.members),
+                    },
+                    samples: list!("samples", $long.samples, $short.samples),
+                    branches: list!("branches", $long.branches, $short.branches),
+                    controls: list!("controls", $long.controls, $short.controls),
+                }
+            };
+        }
+        Memory {
+            eyes: [
+                eye!(left, short_left, left_mask, left_skeleton, left_rows),
+                eye!(right, short_right, right_mask, right_skeleton, right_rows),
+            ],
+            scratch: Scratch {
+                grey: slice!("grey", slices.grey),
+                words: slice!("words", slices.words),
+                plane: slice!("plane", slices.plane),
+                parabolas: slice!("parabolas", slices.parabolas),
+                order: slice!("order", slices.order),
+                edges: list!("cracks", long.cracks, short.cracks),
+                tips: list!("tips", long.tips, short.tips),
+                trusted: list!("trusted", long.trusted, short.trusted),
+                points: list!("points", long.points, short.points),
+                entries: slice!("entries", slices.entries),
+                sides: slice!("sides", slices.sides),
+            },
+            matches: list!("matches", long.matches, short.matches),
+            balls: list!("balls", long.balls, short.balls),
+            depths: list!("depths", long.depths, short.depths),
+            boundary_pairs: list!("boundary pairs", long.boundary_pairs, short.boundary_pairs),
+            skeleton_pairs: list!("skeleton pairs", long.skeleton_pairs, short.skeleton_pairs),
+        }
+    }
+
+    /// The whole core on two pictures; `look` sees what it left in its memory.
+    ///
+    /// # Errors
+    /// Those of the core.
+    pub fn run(
+        &mut self,
+        [left, right]: [&Picture; 2],
+        settings: &Settings,
+        missing: &str,
+        observer: &mut impl Observer,
+        look: impl FnOnce(&Memory<'_>, &Outcome),
+    ) -> Result<Outcome, Finding> {
+        let size = size(left);
+        let (left_bytes, right_bytes) = (left.concat(), right.concat());
+        let grey = |picture: &Picture, bytes| {
+            let size = self::size(picture);
+            Grey::new(size, size.width, bytes).unwrap()
+        };
+        let (a, b) = (grey(left, &left_bytes), grey(right, &right_bytes));
+        let mut memory = self.lend(size, missing);
+        let outcome = pipeline::run(&mut memory, a, b, settings, observer)?;
+        look(&memory, &outcome);
+        Ok(outcome)
+    }
+}
+
+/// Width and height of a picture.
+pub fn size(picture: &Picture) -> Size {
+    Size::new(picture.first().map_or(0, Vec::len), picture.len()).unwrap()
+}
+
+/// A picture of a function of the pixel.
+pub fn picture(width: usize, height: usize, grey: impl Fn(usize, usize) -> u8) -> Picture {
+    (0..height).map(|v| (0..width).map(|u| grey(u, v)).collect()).collect()
+}

@@ -1,0 +1,157 @@
+//! Whatever the pictures show, the whole core answers in both modes: it does not panic, no sum overflows
+//! (the profile of these tests checks), its lists hang together, the same memory used again gives the
+//! same answer, and memory that is too short is a finding.
+
+use oracle::core::{Core, Picture, picture, size};
+use oracle::raster::Random;
+use shared::bitmap::WORD_BITS;
+use shared::fixed::PX;
+use shared::pipeline::{Finding, Memory, Outcome, Settings};
+use shared::stage::binarise::{Polarity, Threshold};
+use shared::stage::correspond::PaperMatching;
+use shared::stage::depth::Optics;
+use shared::stage::thinning::Rule;
+
+const OPTICS: Optics = Optics { focal: 750 * PX, disparity_offset: 0 };
+
+/// Default and paper mode with everything that a user can choose, drawn at random.
+fn settings(random: &mut Random) -> Settings {
+    let mut draw = |n: u64| random.below(n) as usize;
+    let optics = [
+        OPTICS,
+        Optics { focal: 1, disparity_offset: 1 << 20 },
+        Optics { focal: 1 << 22, disparity_offset: -(1 << 20) },
+    ][draw(3)];
+    let paper = PaperMatching { omega: 1 + draw(3), threshold: [0, 3000, i32::MAX][draw(3)] };
+    let chosen = if draw(2) == 0 { Settings::new(optics) } else { Settings::paper(optics, paper) };
+    Settings {
+        median: draw(2) == 0,
+        threshold: [Threshold::Otsu, Threshold::Fixed(100), Threshold::Fixed(0), Threshold::Fixed(255)]
+            [draw(4)],
+        polarity: [Polarity::BrightObject, Polarity::DarkObject, Polarity::Auto][draw(3)],
+        thinning: [Rule::HitOrMiss, Rule::ZhangSuen, Rule::GuoHall, Rule::EdtOrdered][draw(4)],
+        ..chosen
+    }
+}
+
+/// Pictures that have nothing in common but that a camera could send them.
+fn pictures(random: &mut Random) -> [Picture; 2] {
+    let mut draw = |n: usize| random.below(n as u64) as usize;
+    let width = [draw(140), 1, WORD_BITS - 1 + draw(3), 2 * WORD_BITS - 1 + draw(3), 90][draw(5)];
+    let height = [draw(90), 1, 60, 60][draw(4)];
+    let (kind, a, b, c) = (draw(14), draw(width + 1), draw(height + 1), 1 + draw(30));
+    let shift = draw(12);
+    let noise: Vec<u8> = (0..1 << 15).map(|_| draw(256) as u8).collect();
+    let at = |u: usize, v: usize| noise[(v * 151 + u) % noise.len()];
+    let grey = |on: bool| if on { 210 } else { 12 };
+    let draws = |u: usize, v: usize| match kind {
+        0 => at(u, v),
+        1 => grey((u + v) % 2 == 0),
+        2 => grey((u, v) == (a, b)),
+        3 => grey((WORD_BITS - 1..=WORD_BITS).contains(&u)),
+        4 => grey(u % WORD_BITS == 0 || v % 3 == 0),
+        5 => grey(u < a && v < b),
+        6 => grey(u.abs_diff(a).pow(2) + v.abs_diff(b).pow(2) < c * c),
+        7 => grey(u.abs_diff(width / 2).pow(2) + v.abs_diff(height / 2).pow(2) < c * c),
+        8 => (u * 255 / width.max(1)) as u8,
+        9 => grey(u % 4 < 2 || v == 0),
+        10 => grey(u.abs_diff(v) < 1 + c / 8),
+        11 => grey(at(u / 9, v / 9) > 120),
+        12 => grey((u.abs_diff(width / 2) < 20 && v.abs_diff(height / 2) < 15) != (at(u, v) < 20)),
+        _ => {
+            12 + (200 * usize::from(u.abs_diff(width / 2) * 2 + v.abs_diff(height / 2) < 20 + c)
+                + at(u, v) as usize / 6)
+                .min(243) as u8
+        }
+    };
+    let left = picture(width, height, draws);
+    let right = picture(width, height, |u, v| if u + shift < width { draws(u + shift, v) } else { 12 });
+    [left, right]
+}
+
+/// What must hold of the lists after every run that gives an outcome.
+fn check(memory: &Memory<'_>, _: &Outcome) {
+    for eye in &memory.eyes {
+        let mut next = 0;
+        for l in eye.loops.iter() {
+            assert!(l.start == next && l.len >= 8);
+            next += l.len;
+        }
+        assert_eq!(next, eye.contour.len());
+        for branch in eye.branches.iter() {
+            assert!(branch.samples + branch.sample_count <= eye.samples.len());
+            assert!(branch.controls + branch.control_count <= eye.controls.len());
+        }
+    }
+    assert_eq!(memory.balls.len(), memory.depths.len());
+    assert!(memory.balls.iter().all(|b| b.rho > 0));
+}
+
+fn answer(core: &mut Core, pair: &[Picture; 2], settings: &Settings) -> Result<Outcome, Finding> {
+    core.run([&pair[0], &pair[1]], settings, "", &mut (), check)
+}
+
+#[test]
+fn any_pair_gets_an_answer_and_always_the_same() {
+    let (mut random, mut core) = (Random(20), Core::default());
+    let mut models = [0; 2];
+    for case in 0..1500 {
+        let (pair, settings) = (pictures(&mut random), settings(&mut random));
+        let first = answer(&mut core, &pair, &settings);
+        assert!(!matches!(first, Err(Finding::Capacity(_))), "case {case}: {first:?}");
+        models[usize::from(first.is_ok())] += 1;
+        if case % 5 == 0 {
+            // Dirty memory, of another size meanwhile, changes nothing.
+            let _ = answer(&mut core, &pictures(&mut random), &settings);
+            assert_eq!(answer(&mut core, &pair, &settings), first, "case {case}");
+        }
+    }
+    assert!(models[0] > 200 && models[1] > 200, "both answers occur: {models:?}");
+}
+
+#[test]
+fn pictures_of_no_size_or_of_two_sizes_are_refused() {
+    let mut core = Core::default();
+    for settings in [Settings::new(OPTICS), Settings::paper(OPTICS, PaperMatching::default())] {
+        for (width, height) in [(0, 0), (0, 5), (5, 0), (1, 1), (1, 90), (90, 1)] {
+            for value in [0, 255] {
+                let blank = picture(width, height, |_, _| value);
+                let found = answer(&mut core, &[blank.clone(), blank], &settings);
+                assert!(matches!(found, Err(Finding::NoObject(_, 0))), "{width}x{height}: {found:?}");
+            }
+        }
+        let pair = [picture(30, 20, |_, _| 9), picture(20, 30, |_, _| 9)];
+        assert!(matches!(answer(&mut core, &pair, &settings), Err(Finding::SizesDiffer { .. })));
+    }
+}
+
+/// A hand of five fingers with holes in the palm: every list gets more than a few entries.
+fn hand(shift: usize) -> Picture {
+    picture(150, 120, |u, v| {
+        let u = u + shift;
+        let finger = v > 12 && v < 70 && (30..120).contains(&u) && u % 18 < 9 + v / 40;
+        let palm = (70..110).contains(&v) && (30..120).contains(&u);
+        let hole = (84..96).contains(&v) && u % 20 < 10 && (40..110).contains(&u);
+        if (finger || palm) && !hole { 210 } else { 12 }
+    })
+}
+
+#[test]
+fn memory_that_is_too_short_is_a_finding() {
+    let mut core = Core::default();
+    let pair = [hand(0), hand(9)];
+    let modes = [Settings::new(OPTICS), Settings::paper(OPTICS, PaperMatching::default())];
+    for (mode, settings) in modes.iter().enumerate() {
+        assert!(answer(&mut core, &pair, settings).is_ok(), "{:?}", answer(&mut core, &pair, settings));
+        for part in oracle::core::PARTS {
+            let unused: &[&str] = match mode {
+                0 => &["points", "boundary pairs", "skeleton pairs"],
+                _ => &["grey", "order", "crossings", "rows", "trusted", "matches", "balls", "depths"],
+            };
+            let found = core.run([&pair[0], &pair[1]], settings, part, &mut (), check);
+            let refused = matches!(found, Err(Finding::Capacity(_)));
+            assert_eq!(refused, !unused.contains(&part), "mode {mode} without {part}: {found:?}");
+        }
+    }
+    assert_eq!(size(&pair[0]).width, 150);
+}

@@ -1,0 +1,121 @@
+//! The house's plan, held against the source: data flows one way, the core is `no_std` integers, and
+//! `unsafe` stays where registers are.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_owned()
+}
+
+/// A file's code: no comments, no tests at its end, no strings.
+fn code(path: &Path) -> String {
+    let text = fs::read_to_string(path).unwrap();
+    let lines = text.lines().take_while(|l| l.trim() != "#[cfg(test)]" || text.ends_with("mod tests;\n"));
+    let mut code = String::new();
+    for line in lines {
+        let line = line.split("//").next().unwrap_or_default();
+        code.extend(line.split('"').step_by(2).flat_map(|part| [part, " "]));
+        code.push('\n');
+    }
+    code
+}
+
+fn rust_files(folder: &Path) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() && !path.ends_with("target") {
+            files.extend(rust_files(&path));
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            files.push(path);
+        }
+    }
+    files.sort();
+    files
+}
+
+fn words(code: &str) -> impl Iterator<Item = &str> {
+    code.split(|c: char| !c.is_alphanumeric() && c != '_').filter(|w| !w.is_empty())
+}
+
+/// Names of the stages in the order of `pub mod` lines.
+fn stages(module: &Path) -> Vec<String> {
+    let text = fs::read_to_string(module).unwrap();
+    let name = |l: &str| Some(l.strip_prefix("pub mod ")?.strip_suffix(';')?.to_owned());
+    text.lines().filter_map(name).collect()
+}
+
+/// What `use crate::stage::..` lines and paths name: (stage, items).
+fn stage_uses(code: &str) -> Vec<(String, String)> {
+    let uses = code.split("stage::").skip(1);
+    uses.map(|rest| {
+        let stage: String = rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+        let items = rest[stage.len()..].split([';', '(', '\n']).next().unwrap_or_default().to_owned();
+        (stage, items)
+    })
+    .collect()
+}
+
+#[test]
+fn no_stage_uses_a_later_one() {
+    let folder = root().join("shared/src/stage");
+    let order = stages(&folder.join("mod.rs"));
+    assert!(order.len() >= 18, "{order:?}");
+    for (place, name) in order.iter().enumerate() {
+        let code = code(&folder.join(format!("{name}.rs")));
+        for (used, _) in stage_uses(&code) {
+            let at = order.iter().position(|s| *s == used);
+            assert!(at.is_some_and(|at| at < place), "{name} uses {used}, which comes later");
+        }
+        assert!(!code.contains("pipeline"), "{name} knows the pipeline");
+    }
+}
+
+/// A stage takes types and constants of earlier stages. It calls functions of at most one other stage,
+/// its own tool: hulls are compared by their invariants, pruning edits the graph. Whoever calls two
+/// chains them, and only the pipeline does.
+#[test]
+fn only_the_pipeline_chains_stages() {
+    let folder = root().join("shared/src/stage");
+    for name in stages(&folder.join("mod.rs")) {
+        let calls: Vec<String> = stage_uses(&code(&folder.join(format!("{name}.rs"))))
+            .into_iter()
+            .filter(|(_, items)| words(items).any(|item| item.starts_with(|c: char| c.is_lowercase())))
+            .map(|(stage, _)| stage)
+            .collect();
+        assert!(calls.len() <= 1, "{name} calls functions of {calls:?}");
+    }
+    let chained: std::collections::BTreeSet<_> =
+        stage_uses(&code(&root().join("shared/src/pipeline.rs"))).into_iter().map(|(s, _)| s).collect();
+    for name in stages(&folder.join("mod.rs")).iter().filter(|n| *n != "invariants") {
+        assert!(chained.contains(name), "nobody runs {name}");
+    }
+}
+
+#[test]
+fn the_core_has_no_std_no_alloc_and_no_floats() {
+    let library = fs::read_to_string(root().join("shared/src/lib.rs")).unwrap();
+    assert!(library.contains("#![no_std]") && library.contains("#![forbid(unsafe_code)]"));
+    for file in rust_files(&root().join("shared/src")) {
+        for word in words(&code(&file)) {
+            let banned = ["std", "alloc", "f32", "f64", "unsafe"].contains(&word);
+            assert!(!banned, "{} says {word}", file.display());
+            let float = word.contains("f32") || word.contains("f64");
+            assert!(!float, "{} has the number {word}", file.display());
+        }
+    }
+}
+
+#[test]
+fn unsafe_stays_on_the_board() {
+    for package in ["shared", "host", "firmware", "tests"] {
+        for file in rust_files(&root().join(package)) {
+            let allowed = file.strip_prefix(root()).unwrap().starts_with("firmware/src/board");
+            let found = words(&code(&file)).any(|word| word == "unsafe");
+            assert!(allowed || !found, "{} is unsafe", file.display());
+        }
+    }
+    let manifest = fs::read_to_string(root().join("Cargo.toml")).unwrap();
+    assert!(manifest.contains("unsafe_code = \"deny\""));
+}
