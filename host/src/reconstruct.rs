@@ -17,8 +17,10 @@ use crate::stage::smooth::smooth;
 use crate::stage::solid::{Chain, SolidBall, outermost, solid};
 use crate::stage::surface::{RoundCone, SurfaceError, surface};
 use crate::stage::triangulate::triangulate;
+use clap::ValueEnum;
 use image::GrayImage;
 use nalgebra::{Point2, Point3, Vector3};
+use serde::Serialize;
 use shared::bitmap::{Grey, Size};
 use shared::fixed::PX;
 use shared::pipeline::{self, Finding, Memory, Observer, Outcome, Settings, Side};
@@ -46,7 +48,8 @@ pub enum Mode {
 }
 
 /// Which balls make the solid.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Skeleton {
     /// One at every contour point: all medial balls.
     #[default]
@@ -56,7 +59,8 @@ pub enum Skeleton {
 }
 
 /// How far a ball reaches.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Radius {
     /// To the nearest viewing ray of the left boundary.
     #[default]
@@ -68,7 +72,8 @@ pub enum Radius {
 }
 
 /// What the solid is made of.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Pieces {
     /// Round cones between neighbouring balls.
     #[default]

@@ -10,7 +10,7 @@ use shared::stage::thinning::Rule;
 
 use super::{Cli, Failure};
 use crate::calibration::StereoCamera;
-use crate::reconstruct::{self, Options};
+use crate::reconstruct::{self, Options, Pieces, Radius, Skeleton};
 use crate::report::words::{parse_polarity, parse_rule, parse_threshold};
 use crate::source::Pair;
 
@@ -39,6 +39,19 @@ pub struct MethodArgs {
     /// How the outline is thinned [default: edt, or hit-or-miss with --mode paper]
     #[arg(long, value_parser = parse_rule, value_name = "edt|hit-or-miss|zhang-suen|guo-hall")]
     thinning: Option<Rule>,
+    /// Balls at every contour point, or along the curves of the skeleton [default: full]
+    #[arg(long, value_enum, hide_possible_values = true, value_name = "full|nurbs")]
+    skeleton: Option<Skeleton>,
+    /// Prune the skeleton to so many branches, instead of by what stands out
+    #[arg(long, value_name = "N")]
+    branches: Option<u16>,
+    /// How far a ball reaches: to the nearest viewing ray of the outline, to the nearest point of the boundary
+    /// in space, or as the distance transform of its view says [default: rays]
+    #[arg(long, value_enum, hide_possible_values = true, value_name = "rays|boundary|transform")]
+    radius: Option<Radius>,
+    /// Round cones between neighbouring balls, or the balls alone [default: cones]
+    #[arg(long, value_enum, hide_possible_values = true, value_name = "cones|balls")]
+    surface: Option<Pieces>,
     /// Edge length of the model's mesh, mm [default: two pixels at the object]
     #[arg(long, value_parser = positive, value_name = "MM")]
     resolution: Option<f64>,
@@ -62,8 +75,23 @@ impl MethodArgs {
             (Mode::Paper, omega) => reconstruct::Mode::Paper { omega: usize::from(omega.unwrap_or(3)) },
             (Mode::Default, Some(_)) => return Err(usage("--omega belongs to --mode paper")),
         };
-        let (thinning, threshold, polarity) = (self.thinning, self.threshold, self.polarity);
-        Ok(Options { mode, thinning, threshold, polarity, cell: self.resolution })
+        let chosen = self.skeleton.is_some() || self.radius.is_some() || self.surface.is_some();
+        if chosen && self.mode == Mode::Paper {
+            return Err(usage(
+                "--skeleton, --radius and --surface belong to --mode default; the paper has its own",
+            ));
+        }
+        Ok(Options {
+            mode,
+            thinning: self.thinning,
+            skeleton: self.skeleton.unwrap_or_default(),
+            branches: self.branches,
+            radius: self.radius.unwrap_or_default(),
+            pieces: self.surface.unwrap_or_default(),
+            threshold: self.threshold,
+            polarity: self.polarity,
+            cell: self.resolution,
+        })
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::super::{Run, words};
 use crate::calibration::Camera;
-use crate::reconstruct::{Mode, settings};
+use crate::reconstruct::{Mode, Pieces, Radius, Skeleton, settings};
 use crate::stage::balls::px;
 use serde::Serialize;
 use shared::fixed::ONE;
@@ -28,6 +28,12 @@ pub(super) struct Choices {
     pruning: &'static str,
     pruning_px: Option<f64>,
     pruning_branches: Option<u16>,
+    /// Which balls make the solid, in default mode.
+    skeleton: Option<Skeleton>,
+    /// How far they reach, in default mode.
+    radius: Option<Radius>,
+    /// What the solid is made of, in default mode.
+    surface: Option<Pieces>,
     curve_spacing_px: f64,
     curve_smoothing: f64,
     curve_end_weight: i32,
@@ -66,6 +72,9 @@ impl Choices {
             pruning,
             pruning_px,
             pruning_branches,
+            skeleton: omega.is_none().then_some(run.options.skeleton),
+            radius: omega.is_none().then_some(run.options.radius),
+            surface: omega.is_none().then_some(run.options.pieces),
             curve_spacing_px: px(chosen.curves.spacing),
             curve_smoothing: share(chosen.curves.smoothing),
             curve_end_weight: chosen.curves.end_weight,
