@@ -148,7 +148,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 
 fn make(args: &Args, image: &GrayImage) -> Result<Made, Failure> {
     match args.stage {
-        Stage::Clean | Stage::Graph | Stage::Contour | Stage::Medial | Stage::Nurbs => within::make(args, image),
+        Stage::Clean | Stage::Graph | Stage::Contour | Stage::Medial | Stage::Nurbs => {
+            within::make(args, image)
+        }
         _ => Ok(alone::make(args, image)?),
     }
 }

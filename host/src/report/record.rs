@@ -146,12 +146,7 @@ impl Record {
     /// An empty record that keeps no rasters.
     #[must_use]
     pub fn figures_only() -> Self {
-        Self {
-            eyes: Default::default(),
-            pair: Matches::default(),
-            laps: Vec::new(),
-            last: Instant::now(),
-        }
+        Self { eyes: Default::default(), pair: Matches::default(), laps: Vec::new(), last: Instant::now() }
     }
 }
 

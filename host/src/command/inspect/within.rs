@@ -29,7 +29,8 @@ pub(super) fn make(args: &Args, image: &GrayImage) -> Result<Made, Failure> {
     for _ in 0..args.repeat {
         let mut record = Record::new();
         let end = pipeline::run(&mut storage.lend(), grey, grey, &settings, &mut record);
-        let lap = record.laps.iter().find(|lap| lap.stage == name(args.stage) && lap.side != Some(Side::Right));
+        let lap =
+            record.laps.iter().find(|lap| lap.stage == name(args.stage) && lap.side != Some(Side::Right));
         // A pair that is refused later has this stage's result nevertheless.
         match (lap, end) {
             (Some(lap), _) => made.times.push(lap.time),

@@ -52,9 +52,7 @@ pub(super) fn paint_mask(canvas: &mut Canvas, panel: Panel, mask: &GrayImage, ob
 
 /// Paint the grey image, darkened to `part`.
 fn paint_grey(canvas: &mut Canvas, panel: Panel, grey: &GrayImage, part: f64) {
-    panel.paint(canvas, |u, v| {
-        grey.get_pixel_checked(u, v).map(|pixel| mix([0; 3], [pixel.0[0]; 3], part))
-    });
+    panel.paint(canvas, |u, v| grey.get_pixel_checked(u, v).map(|pixel| mix([0; 3], [pixel.0[0]; 3], part)));
 }
 
 /// The image, and over it what was taken for the object.

@@ -58,7 +58,8 @@ fn photograph(eye: &Eye) -> Option<GrayImage> {
     let first = |low: u16, size: u32| i64::from(low) - i64::from((side - size) / 2);
     let (u0, v0) = (first(bounds.min.u, size[0]), first(bounds.min.v, size[1]));
     let square = GrayImage::from_fn(side, side, |x, y| {
-        let inside = |from: i64, by: u32, limit: u32| (from + i64::from(by)).clamp(0, i64::from(limit) - 1) as u32;
+        let inside =
+            |from: i64, by: u32, limit: u32| (from + i64::from(by)).clamp(0, i64::from(limit) - 1) as u32;
         *grey.get_pixel(inside(u0, x, grey.width()), inside(v0, y, grey.height()))
     });
     Some(image::imageops::resize(&square, SIDE, SIDE, FilterType::CatmullRom))
