@@ -151,3 +151,57 @@ fn write_curves(path: &Path, curves: &Curves, comments: &[&str]) -> Result<(), E
     };
     ply::write_points(path, &points, comments)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reconstruct::Mode;
+    use crate::report::fixture::Capsule;
+    use crate::report::record::Record;
+    use std::fs;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name());
+        let mut names: Vec<_> = entries.map(|name| name.into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn a_folder_speaks_of_one_run() {
+        let parent = tempfile::tempdir().unwrap();
+        let folder = parent.path().join("new/model");
+        write(&folder, &Capsule::new(Mode::Default, Record::new()).run()).unwrap();
+        let files = ["boundary.ply", "model.ply", "pictures", "report.json", "skeleton.ply"];
+        assert_eq!(names(&folder), files);
+        assert_eq!(names(&folder.join(PICTURES)), pictures::NAMES);
+        fs::write(folder.join("pictures/mine.png"), "kept").unwrap();
+        write(&folder, &Capsule::new(Mode::Default, Record::figures_only()).run()).unwrap();
+        assert_eq!(names(&folder), files);
+        assert_eq!(names(&folder.join(PICTURES)), ["mine.png"]);
+    }
+
+    #[test]
+    fn a_failure_leaves_the_folder_as_it_was_and_names_the_path() {
+        let parent = tempfile::tempdir().unwrap();
+        let capsule = Capsule::new(Mode::Default, Record::figures_only());
+        fs::create_dir(parent.path().join("report.json")).unwrap();
+        fs::write(parent.path().join("model.ply"), "old").unwrap();
+        let error = write(parent.path(), &capsule.run()).unwrap_err();
+        assert!(error.to_string().ends_with("report.json"), "{error}");
+        assert_eq!(names(parent.path()), ["model.ply", "report.json"]);
+        assert_eq!(fs::read(parent.path().join("model.ply")).unwrap(), b"old");
+    }
+
+    #[test]
+    fn a_folder_that_cannot_be_is_named_and_nothing_is_left() {
+        let parent = tempfile::tempdir().unwrap();
+        let mut capsule = Capsule::new(Mode::Default, Record::figures_only());
+        fs::write(parent.path().join("file"), "").unwrap();
+        let error = write(&parent.path().join("file/models"), &capsule.run()).unwrap_err();
+        assert!(error.to_string().ends_with("file/models"), "{error}");
+        capsule.made.mesh.faces.push([u32::MAX; 3]);
+        assert!(write(&parent.path().join("a/b"), &capsule.run()).is_err());
+        assert_eq!(names(parent.path()), ["file"]);
+    }
+}

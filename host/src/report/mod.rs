@@ -25,3 +25,6 @@ pub struct Run<'a> {
     /// The true surface in the left camera's axes, mm, to be shown beside the model.
     pub truth: Option<&'a Mesh>,
 }
+
+#[cfg(test)]
+pub(crate) mod fixture;

@@ -58,7 +58,7 @@ pub fn parse_threshold(text: &str) -> Result<Threshold, String> {
     text.parse().map(Threshold::Fixed).map_err(|_| "give a grey level from 0 to 255, or otsu".into())
 }
 
-fn name_in<T: PartialEq>(names: &[(&'static str, T)], value: T) -> &'static str {
+fn name_in<T: Copy + PartialEq>(names: &[(&'static str, T)], value: T) -> &'static str {
     names.iter().find(|(_, other)| *other == value).map_or("", |(name, _)| name)
 }
 

@@ -59,3 +59,34 @@ pub fn draw(run: &Run<'_>) -> Vec<(&'static str, RgbImage)> {
     ];
     NAMES.into_iter().zip(drawn).filter_map(|(name, picture)| Some((name, picture?))).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::fixture::Capsule;
+    use crate::report::record::Record;
+
+    fn names(mode: Mode, record: Record) -> Vec<&'static str> {
+        let capsule = Capsule::new(mode, record);
+        let drawn = draw(&capsule.run());
+        for (name, picture) in &drawn {
+            let (width, height) = picture.dimensions();
+            assert!(
+                (400..2000).contains(&width) && (300..1200).contains(&height),
+                "{name}: {width} x {height}"
+            );
+        }
+        drawn.into_iter().map(|(name, _)| name).collect()
+    }
+
+    #[test]
+    fn every_stage_has_its_picture_in_both_modes() {
+        assert_eq!(names(Mode::Default, Record::new()), NAMES);
+        assert_eq!(names(Mode::Paper { omega: 3 }, Record::new()), NAMES);
+    }
+
+    #[test]
+    fn without_rasters_nothing_is_drawn() {
+        assert!(names(Mode::Default, Record::figures_only()).is_empty());
+    }
+}

@@ -18,6 +18,9 @@ const ROWS: i32 = 22;
 /// Vertices of a hull that can be reduced again for a picture.
 const HULL: usize = 1 << 12;
 
+/// Letters nearer to one another than this, px, would not be readable; only the first is drawn.
+const LETTER: f64 = 12.0;
+
 /// A vertex of the left hull, its partner, and whether it decided the match.
 type VertexPair = (PixelPoint, PixelPoint, bool);
 
@@ -63,12 +66,17 @@ pub(super) fn hulls(views: &[Seen<'_>; 2], pair: &Matches, offset: i32) -> Optio
         for k in 0..pairs.len() {
             canvas.line(own(k), own((k + 1) % pairs.len()), 2.0, ACCENT);
         }
+        let mut labelled: Vec<Place> = Vec::new();
         for (k, pair) in pairs.iter().enumerate() {
             let (place, colour) = (own(k), if pair.2 { APART[k % APART.len()] } else { FAINT });
             canvas.dot(place, 4.5, colour, RIM);
             let away = (place - middle).try_normalize(0.0).unwrap_or_else(Place::x);
             let letter = char::from(b'A' + (k % 26) as u8).to_string();
-            canvas.label(&letter, place + away * 16.0, mix(colour, [255; 3], 0.5), RIM);
+            let at = place + away * 16.0;
+            if labelled.iter().all(|other| (at - other).norm() > LETTER) {
+                canvas.label(&letter, at, mix(colour, [255; 3], 0.5), RIM);
+                labelled.push(at);
+            }
         }
     }
     Some(canvas.finish())
@@ -150,7 +158,11 @@ type Match = (PixelPoint, PixelPoint, f64);
 pub(super) fn correspondence(views: &[Seen<'_>; 2], pair: &Matches, offset: i32) -> Option<RgbImage> {
     let frames = frames(views)?;
     let shown = frames.first()?.0.picture()[1];
-    let title = "Correspondence: dark far, yellow near, red no partner";
+    let title = if pair.rows.is_empty() {
+        "Correspondence by the affine map: dark far, yellow near"
+    } else {
+        "Correspondence by rows: dark far, yellow near, red no partner"
+    };
     let (mut canvas, panels) = staggered(title, &frames, shown / 5);
     let &[left, right] = panels.as_slice() else { return None };
     for (panel, view) in panels.iter().zip(views) {
