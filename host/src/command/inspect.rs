@@ -26,9 +26,11 @@
 mod alone;
 mod within;
 
+use super::note;
 use crate::report::pictures::eye::{self, Seen};
 use crate::report::record::{Parts, Rasters};
 use crate::report::words::{parse_polarity, parse_rule, parse_threshold};
+use crate::source::picture::{self, Loaded};
 use crate::stage::balls::px;
 use clap::ValueEnum;
 use clap::error::ErrorKind;
@@ -123,9 +125,10 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let what = "--raw: this stage makes no raster; --json has its figures\n";
         return Err(clap::Error::raw(ErrorKind::ArgumentConflict, what).into());
     }
-    let image = image::open(&args.image)
-        .map_err(|error| format!("cannot read the image {}: {error}", args.image.display()))?
-        .to_luma8();
+    let Loaded { image, warning } = picture::load(&args.image)?;
+    if let Some(warning) = warning {
+        note(&format!("warning: {warning}"));
+    }
     let made = make(args, &image)?;
     if let Some(path) = &args.out {
         let picture = draw(args.stage, &made).ok_or("there is nothing to draw: the mask is empty")?;

@@ -12,6 +12,7 @@ use super::Run;
 use crate::reconstruct::Mode;
 use eye::Seen;
 use image::RgbImage;
+use rayon::prelude::*;
 use shared::pipeline::Side;
 
 use super::words::view;
@@ -46,18 +47,19 @@ pub fn draw(run: &Run<'_>) -> Vec<(&'static str, RgbImage)> {
         // The paper's stages take rows as they are.
         Mode::Paper { omega } => (0, omega),
     };
-    let drawn = [
-        eye::mask(&views),
-        eye::contour(&views),
-        eye::distance(&views),
-        eye::skeleton(&views),
-        pair::hulls(&views, pair, offset),
-        pair::invariants(&views, pair, omega),
-        pair::correspondence(&views, pair, offset),
-        eye::curves(&views),
-        model::model(left, &run.reconstruction.mesh, run.truth),
+    let painters: [&(dyn Fn() -> Option<RgbImage> + Sync); NAMES.len()] = [
+        &|| eye::mask(&views),
+        &|| eye::contour(&views),
+        &|| eye::distance(&views),
+        &|| eye::skeleton(&views),
+        &|| pair::hulls(&views, pair, offset),
+        &|| pair::invariants(&views, pair, omega),
+        &|| pair::correspondence(&views, pair, offset),
+        &|| eye::curves(&views),
+        &|| model::model(left, &run.reconstruction.mesh, run.truth),
     ];
-    NAMES.into_iter().zip(drawn).filter_map(|(name, picture)| Some((name, picture?))).collect()
+    let named = NAMES.into_par_iter().zip(painters);
+    named.filter_map(|(name, paint)| Some((name, paint()?))).collect()
 }
 
 #[cfg(test)]

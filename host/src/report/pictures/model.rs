@@ -4,7 +4,7 @@ use super::canvas::{Anchor, Canvas, Letters, Place};
 use super::colour::{FAINT, INK, PAPER};
 use super::panel::{FOOT, GAP, HEAD};
 use crate::mesh::Mesh;
-use crate::render::render;
+use crate::render::render_with;
 use crate::report::record::Eye;
 use crate::view::Pinhole;
 use image::imageops::FilterType;
@@ -12,7 +12,9 @@ use image::{DynamicImage, GrayImage, RgbImage};
 use nalgebra::{Matrix3, Point3};
 
 /// Side of a view, px.
-const SIDE: u32 = 420;
+const SIDE: u32 = 360;
+/// Rays a pixel along each axis.
+const RAYS: u32 = 2;
 /// Part of a view that the longest side of the model's box fills.
 const FILL: f64 = 0.86;
 
@@ -80,5 +82,5 @@ fn shaded(mesh: &Mesh, cube: (Point3<f64>, f64), turn: &Matrix3<f64>) -> Option<
         principal: [middle - focal * centre.x / centre.z, middle - focal * centre.y / centre.z],
         centre: Point3::origin(),
     };
-    render(&turned, &[view]).pop()
+    render_with(&turned, &[view], RAYS).pop()
 }
