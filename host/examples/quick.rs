@@ -1,3 +1,4 @@
+//! One pair from the command line, with all that the core says of it.
 use host::*;
 fn main() {
     let a: Vec<String> = std::env::args().collect();
