@@ -271,8 +271,9 @@ fn mesh(
     options: &Options,
 ) -> Result<(f64, Mesh), SurfaceError> {
     let coarsens = options.cell.is_none() && matches!(options.mode, Mode::Paper { .. });
-    let least = if coarsens { reach(cones) / MOST_CELLS } else { 0.0 };
-    let mut cell = options.cell.unwrap_or_else(|| pixel_at(camera, cones).max(least));
+    let pixel = pixel_at(camera, cones);
+    let flung = coarsens && reach(cones) > FLUNG * pixel;
+    let mut cell = options.cell.unwrap_or(if flung { reach(cones) / MOST_CELLS } else { pixel });
     loop {
         match surface(cones, cell) {
             Err(SurfaceError::TooFine { .. }) if coarsens && cell < COARSEST_MM => cell *= 4.0,
@@ -283,8 +284,10 @@ fn mesh(
 
 /// No cell is made coarser than this, mm.
 const COARSEST_MM: f64 = 1e5;
-/// Cells from end to end of a solid whose balls fly apart.
-const MOST_CELLS: f64 = 1000.0;
+/// Pixels at the nearest ball that balls reach when they fly apart; without, it is some hundred.
+const FLUNG: f64 = 10_000.0;
+/// Cells from the camera to the far end of such a solid.
+const MOST_CELLS: f64 = 200.0;
 
 /// The farthest that a ball reaches from the camera, mm.
 fn reach(cones: &[RoundCone]) -> f64 {
