@@ -46,10 +46,10 @@ fn pictures(random: &mut Random) -> [Picture; 2] {
     let grey = |on: bool| if on { 210 } else { 12 };
     let draws = |u: usize, v: usize| match kind {
         0 => at(u, v),
-        1 => grey((u + v) % 2 == 0),
+        1 => grey((u + v).is_multiple_of(2)),
         2 => grey((u, v) == (a, b)),
         3 => grey((WORD_BITS - 1..=WORD_BITS).contains(&u)),
-        4 => grey(u % WORD_BITS == 0 || v % 3 == 0),
+        4 => grey(u.is_multiple_of(WORD_BITS) || v.is_multiple_of(3)),
         5 => grey(u < a && v < b),
         6 => grey(u.abs_diff(a).pow(2) + v.abs_diff(b).pow(2) < c * c),
         7 => grey(u.abs_diff(width / 2).pow(2) + v.abs_diff(height / 2).pow(2) < c * c),
@@ -100,7 +100,7 @@ fn any_pair_gets_an_answer_and_always_the_same() {
         let first = answer(&mut core, &pair, &settings);
         assert!(!matches!(first, Err(Finding::Capacity(_))), "case {case}: {first:?}");
         models[usize::from(first.is_ok())] += 1;
-        if case % 5 == 0 {
+        if case % 5 == 1 {
             // Dirty memory, of another size meanwhile, changes nothing.
             let _ = answer(&mut core, &pictures(&mut random), &settings);
             assert_eq!(answer(&mut core, &pair, &settings), first, "case {case}");

@@ -72,7 +72,8 @@ fn core_checksum(pair: &Pair, settings: &Settings) -> u64 {
             let _ = write!(text, "{:?}{:?}", memory.boundary_pairs, memory.skeleton_pairs);
         })
         .unwrap();
-    checksum(format!("{text}{outcome:?}").into_bytes())
+    let _ = write!(text, "{:?}{:?}{:?}", outcome.plane, outcome.areas, outcome.frontier_offsets);
+    checksum(text.into_bytes())
 }
 
 #[test]

@@ -203,7 +203,7 @@ fn an_outline_without_counterpart_is_refused() {
     let comb = |teeth: f64| {
         move |u: f64, v: f64| {
             let inside = (u - 170.0).abs() < 60.0 && (v - 120.0).abs() < 60.0;
-            inside && (v < 75.0 || v > 165.0 || ((u - 110.0) / teeth).rem_euclid(2.0) < 1.0)
+            inside && (!(75.0..=165.0).contains(&v) || ((u - 110.0) / teeth).rem_euclid(2.0) < 1.0)
         }
     };
     let [left, _] = drawn_pair(40.0, 0.0, comb(7.5));

@@ -223,3 +223,41 @@ fn triple_agrees(
     let (a, b) = (i128::from(left) * i128::from(areas.1), i128::from(right) * i128::from(areas.0));
     a > 0 && b > 0 && (a - b).abs() << 16 < a.max(b) * i128::from(threshold)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixed::PX;
+
+    fn hull(points: [(i32, i32); 5], unit: i32) -> [PixelPoint; 5] {
+        points.map(|(u, v)| PixelPoint { u: u * unit, v: v * unit })
+    }
+
+    const HOUSE: [(i32, i32); 5] = [(40, 0), (90, 30), (80, 100), (10, 90), (0, 30)];
+
+    #[test]
+    fn equal_hulls_match_at_the_rows_and_symmetric_ones_tie_there() {
+        let house = hull(HOUSE, PX);
+        let found = match_cuts(&house, &house).unwrap();
+        assert_eq!((found.errors[0], found.least, found.shift), (0, 0, 0));
+        // A parallelogram with a corner doubled is its own image after half a turn: any tie goes to 0.
+        let diamond = hull([(50, 0), (100, 50), (50, 100), (0, 50), (0, 50)], PX);
+        assert_eq!(match_cuts(&diamond, &diamond).unwrap().shift, 0);
+    }
+
+    #[test]
+    fn another_shape_picks_another_shift() {
+        let house = hull(HOUSE, PX);
+        let mirrored = hull([(60, 0), (100, 30), (90, 90), (20, 100), (10, 30)], PX);
+        let found = match_cuts(&house, &mirrored).unwrap();
+        assert!(found.errors[0] > found.errors[found.least]);
+    }
+
+    #[test]
+    fn a_hull_of_a_few_units_is_cut_without_overflow() {
+        for unit in 0..4 {
+            let tiny = hull([(1, 0), (2, 3), (1, 7), (0, 5), (0, 2)], unit);
+            assert_eq!(match_cuts(&tiny, &tiny).is_some(), unit > 0);
+        }
+    }
+}

@@ -92,3 +92,55 @@ fn depth(
     let offset = i64::from(optics.disparity_offset);
     BallDepth { disparity: ((((matched + offset) * factor + (1 << 29)) >> 30) - offset) as i32, weight }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixed::PX;
+    use crate::point::{Direction, PixelPoint};
+    use heapless::Vec;
+
+    /// A ball of radius 20 px seen from the front: both contacts, left and right, one disparity.
+    fn rim(side: i32, turn: i32) -> (ContourPoint, ContourMatch) {
+        let normal = Direction { u: (side * UNIT) as i16, v: 0 };
+        let at = PixelPoint { u: side * 20 * PX, v: 0 };
+        let matched =
+            ContourMatch { disparity: 50 * PX, weight: UNIT as u16, normal_right: normal.turned(turn) };
+        (ContourPoint { at, normal, border: false }, matched)
+    }
+
+    fn disparity(rims: [(ContourPoint, ContourMatch); 2], optics: Optics) -> BallDepth {
+        let ball = MedialBall { centre: PixelPoint::default(), rho: 20 * PX, contacts: [0, 1] };
+        let mut depths = Vec::<_, 1>::new();
+        ball_depths(&[ball], &rims.map(|r| r.0), &rims.map(|r| r.1), optics, &mut depths).unwrap();
+        depths[0]
+    }
+
+    #[test]
+    fn a_contact_lies_in_front_of_the_centre() {
+        let optics = Optics { focal: 400 * PX, disparity_offset: 0 };
+        let found = disparity([rim(1, 0), rim(-1, 0)], optics);
+        // 50 px times f^2 / (f^2 + rho^2), to a unit.
+        let truth = 50.0 * 400.0 * 400.0 / (400.0 * 400.0 + 20.0 * 20.0) * f64::from(PX);
+        assert!((f64::from(found.disparity) - truth).abs() <= 1.0, "{found:?}, {truth}");
+        assert_eq!(found.weight, UNIT);
+    }
+
+    #[test]
+    fn unmatched_contacts_give_their_plain_average_and_no_weight() {
+        let mut rims = [rim(1, 0), rim(-1, 0)];
+        rims.iter_mut().for_each(|r| r.1.weight = 0);
+        rims[0].1.disparity = 60 * PX;
+        let found = disparity(rims, Optics { focal: 1 << 22, disparity_offset: 0 });
+        assert_eq!((found.disparity, found.weight), (55 * PX, 0));
+    }
+
+    #[test]
+    fn extremes_do_not_overflow() {
+        for focal in [0, 1, 1 << 22, i32::MAX] {
+            for disparity_offset in [i32::MIN, 0, i32::MAX] {
+                let _ = disparity([rim(1, UNIT), rim(-1, -UNIT)], Optics { focal, disparity_offset });
+            }
+        }
+    }
+}

@@ -51,6 +51,7 @@ impl ImagePlane {
     }
 
     /// The robust fit, or `None` without an observation of positive weight.
+    #[expect(clippy::needless_pass_by_value, reason = "iterators are handed over, and cloned for each pass")]
     pub fn fit(observations: impl Iterator<Item = Observation> + Clone) -> Option<Self> {
         let mut plane = Self::fit_once(observations.clone().map(|o| (o, i128::from(o.weight))))?;
         for _ in 0..ROUNDS {
@@ -68,6 +69,7 @@ impl ImagePlane {
     }
 
     /// Weighted least squares with the ridge.
+    #[expect(clippy::needless_pass_by_value, reason = "iterators are handed over, and cloned for each pass")]
     fn fit_once(weighted: impl Iterator<Item = (Observation, i128)> + Clone) -> Option<Self> {
         let sum = |f: &dyn Fn(&Observation) -> i128| weighted.clone().map(|(o, w)| w * f(&o)).sum::<i128>();
         let total = sum(&|_| 1);
@@ -109,6 +111,7 @@ pub struct AffineMap {
 
 impl AffineMap {
     /// The map that takes the first point of each pair nearest to the second, robustly.
+    #[expect(clippy::needless_pass_by_value, reason = "iterators are handed over, and cloned for each pass")]
     pub fn fit(pairs: impl Iterator<Item = (PixelPoint, PixelPoint)> + Clone) -> Option<Self> {
         let observe = |f: fn(PixelPoint) -> i32| {
             ImagePlane::fit(pairs.clone().map(move |(a, b)| Observation {
