@@ -76,9 +76,9 @@ part_lint() { check cargo clippy -q --workspace --all-targets --locked -- -D war
 
 part_test() {
     ruler
-    tests cargo test --workspace --locked
+    tests cargo test --workspace --locked --no-fail-fast
     # The frozen bits again, as the optimiser makes them, and the command that a newcomer runs first.
-    tests cargo test --release --locked -p system-tests --test frozen
+    tests cargo test --release --locked -p system-tests --test determinism
     check cargo run -q --release --locked -p host -- demo --out target/ci-demo
 }
 

@@ -37,7 +37,7 @@ use std::time::{Duration, Instant};
 /// The two ways to match and to grow.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mode {
-    /// What works: METHOD's mended steps; gates refuse.
+    /// What works (docs/algorithm.md); gates refuse.
     #[default]
     Default,
     /// As the paper says, with omega of 1, 2 or 3; gates warn.

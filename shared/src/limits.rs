@@ -10,7 +10,7 @@ use core::fmt;
 /// 2^41, and a product of two such lengths with a Q1.14 direction below 2^55: all fit an `i64`.
 pub const MAX_SIDE: usize = 4096;
 
-/// Horizontal cuts through the hull, two vertices each (METHOD: six cuts, twelve vertices).
+/// Horizontal cuts through the hull, two vertices each (docs/algorithm.md, step 11).
 pub const HULL_CUTS: usize = 6;
 
 /// Crossings of one row with all contours of a view. An object that crosses a row more often than

@@ -1,4 +1,4 @@
-//! Each bad input of METHOD's table and what it must give: a refusal whose sentence says what is wrong
+//! Each bad input and what it must give: a refusal whose sentence says what is wrong
 //! and what to do, a warning beside a model, or a mended model. Thresholds: docs/decisions/0005-gates.md.
 
 use host::evaluate::{Options as Ruler, evaluate};

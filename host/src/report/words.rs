@@ -147,8 +147,8 @@ pub fn sentence(finding: &Finding) -> String {
             px(*residual)
         ),
         Finding::SwappedEyes(disparity) => format!(
-            "the object's disparity is {:.1} px, which puts it behind the cameras: left and right are swapped; \
-             give the images in the other order",
+            "the object's disparity is {:.1} px, which puts it at infinity or behind the cameras: left and right \
+             are swapped, or one view is mirrored; try --swap",
             px(*disparity)
         ),
         Finding::NotRectified { top, bottom } => format!(

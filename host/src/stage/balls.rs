@@ -1,4 +1,5 @@
-//! Balls: each medial ball of the left view, lifted into space (paper section 4.2, METHOD steps 9 and 14).
+//! Balls: each medial ball of the left view, lifted into space (paper section 4.2; docs/algorithm.md, steps
+//! 21 and 24).
 //!
 //! * **In**: what the core says of the left contour, its medial balls and their disparities.
 //! * **Out**: centres and radii in rectified axes, mm.

@@ -1,5 +1,5 @@
-//! Refinement: the depth at which a ball also touches the tangent planes of the right view (METHOD
-//! step 12).
+//! Refinement: the depth at which a ball also touches the tangent planes of the right view
+//! (docs/algorithm.md, step 22).
 //!
 //! A ball on the left ray m = (x, y, 1) with angular radius rho^ touches the plane through the right
 //! camera and its contour tangent when N_R . (Z m - B e_x) = Z rho^, N_R the plane's unit normal pointing

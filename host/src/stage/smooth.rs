@@ -1,4 +1,4 @@
-//! Smoothing of depth over neighbouring balls, across branches (METHOD step 13).
+//! Smoothing of depth over neighbouring balls, across branches (docs/algorithm.md, step 23).
 //!
 //! A ball's depth comes from two contacts and is as noisy as they are; an object's depth changes slowly
 //! along and between its branches. What differs from the disparity plane is regressed locally: linear in

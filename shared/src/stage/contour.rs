@@ -1,6 +1,6 @@
 //! Contour: the silhouette's edge as ordered loops of sub-pixel points with normals.
 //!
-//! Paper section 3.2 keeps the boundary's pixels; METHOD step 5 needs it to a fraction of a pixel,
+//! Paper section 3.2 keeps the boundary's pixels; depth needs it to a fraction of a pixel,
 //! since one pixel of disparity is millimetres of depth.
 //!
 //! * **In**: the grey image and the cleaned mask, both of one size.

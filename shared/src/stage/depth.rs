@@ -1,4 +1,4 @@
-//! Depth of each ball from its contour contacts (METHOD step 9): no skeleton of the right view needed.
+//! Depth of each ball from its contour contacts (docs/algorithm.md, step 17): no skeleton of the right view needed.
 //!
 //! A ball of radius rho touches the left contour where its normal is nL and the right one where it is nR.
 //! Both contours of a sphere are circles about its centre, so the centre's disparity is that of a contact

@@ -2,7 +2,7 @@
 //! contour point.
 //!
 //! The paper (section 4.1.3) lets boundary points inside matched hulls correspond; in a rectified pair
-//! they can only do so along a row, and METHOD step 8 uses that.
+//! they can only do so along a row.
 //!
 //! * **In**: both contours and the disparity plane that the hulls gave.
 //! * **Out**: for each point of the left contour its disparity, how well it is known, and the right

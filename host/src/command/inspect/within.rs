@@ -11,8 +11,9 @@ use shared::fixed::PX;
 use shared::pipeline::{self, Settings, Side};
 use shared::stage::depth::Optics;
 
-/// Depth is of no interest here: any focal length does, 1/256 px.
-const FOCAL: i32 = 1000 * PX;
+/// Depth is of no interest here: any focal length does, and any disparity between the image and itself
+/// that puts the object in front of the cameras, 1/256 px.
+const OPTICS: Optics = Optics { focal: 1000 * PX, disparity_offset: 100 * PX };
 
 /// Run the pipeline as often as is asked for.
 pub(super) fn make(args: &Args, image: &GrayImage) -> Result<Made, Failure> {
@@ -22,7 +23,7 @@ pub(super) fn make(args: &Args, image: &GrayImage) -> Result<Made, Failure> {
         threshold: args.threshold,
         polarity: args.polarity,
         thinning: args.rule,
-        ..Settings::new(Optics { focal: FOCAL, disparity_offset: 0 })
+        ..Settings::new(OPTICS)
     };
     let mut storage = Storage::new(size.width, size.height)?;
     let mut made = Made::default();
