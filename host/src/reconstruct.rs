@@ -14,7 +14,7 @@ use crate::stage::curve::curve_balls;
 use crate::stage::rectify::{PixelBox, Rectification, RectifiedCamera, RectifyError};
 use crate::stage::refine::refine;
 use crate::stage::smooth::smooth;
-use crate::stage::solid::{Chain, SolidBall, outermost, solid};
+use crate::stage::solid::{Chain, SolidBall, outermost, solid, spheres};
 use crate::stage::surface::{RoundCone, SurfaceError, surface};
 use crate::stage::triangulate::triangulate;
 use clap::ValueEnum;
@@ -369,9 +369,7 @@ fn grow(
     let outermost = outermost(&solid_balls, pixel);
     let cones = match options.pieces {
         Pieces::Cones => solid(&outermost, &chains),
-        Pieces::Balls => {
-            outermost.iter().map(|b| RoundCone { centres: [b.centre; 2], radii: [b.radius; 2] }).collect()
-        }
+        Pieces::Balls => spheres(&outermost),
     };
     Ok(Grown { cones, skeleton: skeleton(memory, &solid_balls), boundary })
 }
@@ -426,9 +424,14 @@ fn grow_as_paper(camera: &RectifiedCamera, memory: &Memory<'_>) -> Grown {
     let boundary = Curves { points: lift(memory.boundary_pairs), ..Curves::default() };
     let centres = lift(memory.skeleton_pairs);
     let radii: Vec<f64> = centres.iter().map(|c| distance_to_points(&boundary.points, c)).collect();
-    let cones = centres.iter().zip(&radii).filter(|(_, r)| r.is_finite() && **r > 0.0);
+    let ball = |(place, (&centre, &radius)): (usize, (&Point3<f64>, &f64))| {
+        let [left, _] = camera.project(&centre)?;
+        let ball = SolidBall { centre, radius, at: left.coords, place };
+        (radius.is_finite() && radius > 0.0).then_some(ball)
+    };
+    let balls: Vec<SolidBall> = centres.iter().zip(&radii).enumerate().filter_map(ball).collect();
     Grown {
-        cones: cones.map(|(c, r)| RoundCone { centres: [*c; 2], radii: [*r; 2] }).collect(),
+        cones: spheres(&outermost(&balls, 0.0)),
         skeleton: Curves { points: centres, radii, edges: Vec::new() },
         boundary,
     }

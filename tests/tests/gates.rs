@@ -128,7 +128,7 @@ fn a_circle_is_nothing_unusual() {
 fn swapped_eyes_are_named_and_never_swapped_back() {
     for shape in [Shape::Torus, Shape::Teapot, Shape::Screwdriver] {
         let [left, right] = pair(shape, 2);
-        let found = refusal(&[right, left], &["left and right are swapped", "other order", "-"]);
+        let found = refusal(&[right, left], &["left and right", "are swapped", "--swap", "-"]);
         assert!(matches!(found, Finding::SwappedEyes(..0)), "{shape}: {found:?}");
     }
 }

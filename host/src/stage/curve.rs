@@ -3,8 +3,8 @@
 //! * **In**: the curves that the core fitted to the branches, in (u, v, rho, d).
 //! * **Out**: balls a fixed step of arc apart, in chains.
 //! * **How**: a ball touches the contour at the point nearest to its centre, and at the nearest of those
-//!   seen more than [`APART`] from there. Its depth is as well known as the contacts', but at least
-//!   [`LEAST_WEIGHT`]: the fit has averaged along the curve already.
+//!   seen more than 73 degrees from there. Its depth is as well known as the contacts', but at least
+//!   a quarter: the fit has averaged along the curve already.
 //! * **Cost**: number of balls times contour length.
 
 use super::balls::{Ball, Edge, centre_ray, px, px2};

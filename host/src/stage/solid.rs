@@ -8,7 +8,7 @@
 
 //!
 //! Contour points around a round part of the object all have nearly the same ball. Those that stick out of
-//! a larger one by less than [`SLACK`] add nothing but the noise of their radii and are left out: a
+//! a larger one by less than a twentieth of a pixel add nothing but the noise of their radii and are left out: a
 //! sphere keeps a few balls instead of hundreds.
 //!
 //! * **Cost**: number of balls times balls kept.
@@ -84,6 +84,11 @@ pub fn solid(balls: &[SolidBall], chains: &[Chain]) -> Vec<RoundCone> {
         }
     }
     cones
+}
+
+/// The balls alone, as round cones.
+pub fn spheres(balls: &[SolidBall]) -> Vec<RoundCone> {
+    balls.iter().map(|b| RoundCone { centres: [b.centre; 2], radii: [b.radius; 2] }).collect()
 }
 
 /// Whether the axis runs on from one ball to the other.

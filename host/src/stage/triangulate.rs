@@ -1,4 +1,4 @@
-//! Triangulation: the point in space whose images a pair of pixels are (paper section 4.2, its [10]).
+//! Triangulation: the point in space whose images a pair of pixels are (paper section 4.2, its reference 10).
 //!
 //! In a rectified pair a match that lies on one row is triangulated exactly by Z = f B / d. The paper's
 //! matches do not keep to rows. Of all pairs of points on a common row, the least-squares nearest to such
