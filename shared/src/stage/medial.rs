@@ -12,7 +12,7 @@
 //!   Choi 2012), found in one pass. Points q seen at more than 60 degrees from the normal are left
 //!   out: there the separation angle p - centre - q is below 60 degrees, and the disc is born of noise of
 //!   the contour itself.
-//! * **Kept** are balls with no contour point more than [`SLACK`] inside.
+//! * **Kept** are balls with no contour point more than 0.4 px inside.
 //! * **Cost**: quadratic in the contour's length; multiplications only in the inner loop.
 //! * **Bounds**: squared lengths below 2^43, radius times dot product below 2^62.
 

@@ -4,7 +4,7 @@
 //! rectified pair rows stay rows, so the map is a plane of disparity, d = a u + b v + c; a general map is
 //! two planes, one a coordinate.
 //!
-//! * **How**: least squares with Cauchy weights 1 / (1 + (e / 1 px)^2), re-weighted [`ROUNDS`] times, and
+//! * **How**: least squares with Cauchy weights 1 / (1 + (e / 1 px)^2), re-weighted six times, and
 //!   a ridge of 1 px^2 on both slopes, so that a narrow object does not get a wild slope.
 //! * **Bounds**: coordinates within 2^20 (1/256 px), at most 2^16 observations of weight at most 2^14:
 //!   every sum stays below 2^100 of `i128`.
