@@ -25,7 +25,6 @@ use shared::bitmap::{Grey, Size};
 use shared::fixed::PX;
 use shared::pipeline::{self, Finding, Memory, Observer, Outcome, Settings, Side};
 use shared::stage::binarise;
-use shared::stage::clean;
 use shared::stage::contour::ContourLoop;
 use shared::stage::correspond::PaperMatching;
 use shared::stage::depth::Optics;
@@ -204,7 +203,8 @@ pub fn reconstruct(
     };
     clock.lap("grow");
     if grown.cones.is_empty() {
-        return Err(Refusal::Behind);
+        let erased = |f: &Finding| matches!(f, Finding::SkeletonErased(_));
+        return Err(outcome.findings.iter().find(|f| erased(f)).map_or(Refusal::Behind, |f| (*f).into()));
     }
     let cell = options.cell.unwrap_or_else(|| default_cell(&camera, &grown.cones));
     let body = keep_largest_body(&surface(&grown.cones, cell)?);
@@ -257,6 +257,10 @@ fn grey(image: &GrayImage) -> Result<Grey<'_>, Finding> {
 pub(crate) fn settings(camera: &RectifiedCamera, options: &Options) -> Settings {
     let fixed = |x: f64| (x * f64::from(PX)).round() as i32;
     let optics = Optics { focal: fixed(camera.f), disparity_offset: fixed(camera.disparity_offset()) };
+    core_settings(optics, options)
+}
+
+fn core_settings(optics: Optics, options: &Options) -> Settings {
     let chosen = match options.mode {
         Mode::Default => Settings::new(optics),
         Mode::Paper { omega } => Settings::paper(optics, PaperMatching { omega, ..PaperMatching::default() }),
@@ -285,28 +289,21 @@ fn rectification(
     if plain.as_ref().is_ok_and(Rectification::is_identity) {
         return Ok(plain?);
     }
-    let boxes = [object_box(left, Side::Left, options)?, object_box(right, Side::Right, options)?];
+    // What a camera is set to does not matter where the object lies.
+    let settings = core_settings(Optics { focal: PX, disparity_offset: 0 }, options);
+    let boxes = [object_box(left, Side::Left, &settings)?, object_box(right, Side::Right, &settings)?];
     Ok(Rectification::around(calibration, boxes)?)
 }
 
 /// The box of the object in a raw image.
-fn object_box(image: &GrayImage, side: Side, options: &Options) -> Result<PixelBox, Refusal> {
+fn object_box(image: &GrayImage, side: Side, settings: &Settings) -> Result<PixelBox, Finding> {
     let grey = grey(image)?;
     let size = grey.size();
-    let mut smooth = vec![0; size.pixels()];
-    let grey = binarise::median(grey, &mut smooth).map_err(Finding::from)?;
-    let level = options.threshold.level(&binarise::histogram(grey));
-    let tone = options.polarity.tone(grey, level);
-    let mut words = vec![0; size.words()];
-    let mut mask = binarise::binarise(grey, level, tone, &mut words).map_err(Finding::from)?;
-    clean::keep_largest(&mut mask, &mut vec![0; clean::scratch_words(size)]).map_err(Finding::from)?;
-    let percent = mask.count() * 100 / size.pixels().max(1);
-    if percent > pipeline::MAX_COVER as usize {
-        return Err(Finding::FillsImage(side, percent as u32).into());
-    }
-    let bounds = mask.bounds().ok_or(Finding::NoObject(side, 0))?;
+    let mut words = vec![0; 3 * size.words()];
+    let (mask, scratch) = words.split_at_mut(size.words());
+    let found = pipeline::object_box(side, grey, (mask, &mut vec![0; size.pixels()], scratch), settings)?;
     let corner = |p: shared::point::Pixel| Point2::new(f64::from(p.u), f64::from(p.v));
-    Ok(PixelBox { min: corner(bounds.min), max: corner(bounds.max) })
+    Ok(PixelBox { min: corner(found.min), max: corner(found.max) })
 }
 
 /// The mesh's grid spacing by default, mm: two pixels at the nearest ball, but no more than

@@ -378,7 +378,8 @@ pub struct Grey<'a> {
 impl<'a> Grey<'a> {
     /// An image whose rows start `stride` bytes apart.
     pub fn new(size: Size, stride: usize, data: &'a [u8]) -> Result<Self, CapacityError> {
-        let needed = if size.height == 0 { 0 } else { stride * (size.height - 1) + size.width };
+        let rows_before_last = stride.saturating_mul(size.height.saturating_sub(1));
+        let needed = if size.height == 0 { 0 } else { rows_before_last.saturating_add(size.width) };
         if stride < size.width || data.len() < needed {
             return Err(CapacityError { what: "bytes in a grey image", limit: data.len() });
         }

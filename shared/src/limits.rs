@@ -7,7 +7,7 @@
 use core::fmt;
 
 /// Largest image side, px. Coordinates in 1/256 px then stay below 2^20, a squared distance below
-/// 2^41, and a product of two such lengths with a Q1.14 direction below 2^55: all fit an `i64`.
+/// 2^43, and a product of two such lengths with a Q1.14 direction below 2^55: all fit an `i64`.
 pub const MAX_SIDE: usize = 4096;
 
 /// Horizontal cuts through the hull, two vertices each (docs/algorithm.md, step 11).
@@ -15,7 +15,7 @@ pub const HULL_CUTS: usize = 6;
 
 /// Crossings of one row with all contours of a view. An object that crosses a row more often than
 /// this is a comb; its further crossings are left unmatched.
-pub const ROW_CROSSINGS: usize = 32;
+pub const ROW_CROSSINGS: usize = 64;
 
 /// A list or raster was lent less memory than the input needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -55,7 +55,7 @@ fn nothing_or_next_to_nothing_is_no_object() {
 #[test]
 fn an_object_over_most_of_the_image_is_the_background() {
     let dark = drawn_pair(40.0, 0.0, |u, v| !disc(160.0, 120.0, 40.0)(u, v));
-    let found = refusal(&dark, &["covers", "% of the left image", "--polarity dark"]);
+    let found = refusal(&dark, &["covers", "% of the left image", "--polarity"]);
     assert!(matches!(found, Finding::FillsImage(Side::Left, 61..=100)), "{found:?}");
     let dark_object = Options { polarity: Polarity::DarkObject, ..Options::default() };
     assert!(model(&dark, &dark_object).is_ok(), "what the sentence proposes helps");

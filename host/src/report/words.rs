@@ -84,6 +84,8 @@ pub const fn name(finding: &Finding) -> &'static str {
         Finding::NotAffine(_) => "not-affine",
         Finding::SwappedEyes(_) => "swapped-eyes",
         Finding::NotRectified { .. } => "not-rectified",
+        Finding::VerticalOffset(_) => "vertical-offset",
+        Finding::SkeletonErased(_) => "skeleton-erased",
         Finding::Unmatched(_) => "unmatched",
         Finding::NoMap => "no-map",
         Finding::Capacity(_) => "capacity",
@@ -117,7 +119,7 @@ pub fn sentence(finding: &Finding) -> String {
         ),
         Finding::FillsImage(side, percent) => format!(
             "the object covers {percent} % of the {} image, which is more likely the background; \
-             try --polarity dark for a dark object, or move the camera back",
+             try the other --polarity, or move the camera back",
             view(side)
         ),
         Finding::SecondObject(side, percent) => format!(
@@ -157,12 +159,27 @@ pub fn sentence(finding: &Finding) -> String {
             px(*top),
             px(*bottom)
         ),
+        Finding::VerticalOffset(rows) => format!(
+            "the object lies {:+.2} px lower in the right image, which was corrected; calibrate again, and check that \
+             left and right are not swapped",
+            px(*rows)
+        ),
+        Finding::SkeletonErased(side) => format!(
+            "thinning left nothing of the object in the {} image, as Zhang-Suen's rule does with some even shapes; \
+             take --thinning edt",
+            view(side)
+        ),
         Finding::Unmatched(share) => format!(
-            "{:.0} % of the left outline has no counterpart in the right image: the views are too different, or the \
-             calibration is wrong",
+            "{:.0} % of the left outline has no counterpart in the right image: the views are too different, the \
+             object is too finely toothed, or the calibration is wrong; bring the cameras closer together, or \
+             calibrate again",
             percent(*share)
         ),
-        Finding::NoMap => "the outlines have too few corners to be matched".into(),
+        Finding::NoMap => {
+            "the outlines cannot be matched: they have too few corners, or the image cuts them off on \
+                           both sides; move the camera back"
+                .into()
+        }
         Finding::Capacity(error) => {
             format!(
                 "the outline is too complex for the memory set aside: {error}; smooth the image or reduce its size"

@@ -206,7 +206,7 @@ fn resample(
     push(loops, here, "contour loops")
 }
 
-/// The pixel in which the contour's highest point lies, and its lowest: `(top, bottom)`, 1/256 px.
+/// The contour's highest point and its lowest: `(top, bottom)`.
 /// These are the frontier points, where the epipolar plane touches the object: in a rectified pair
 /// both eyes see them in the same row.
 pub fn frontier(points: &[ContourPoint]) -> Option<(ContourPoint, ContourPoint)> {

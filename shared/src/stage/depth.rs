@@ -16,7 +16,7 @@
 //! * **Out**: a disparity a ball, 1/256 px, and how well it is known.
 //! * **Bounds**: every product below 2^60.
 
-use crate::fixed::{UNIT, div_round};
+use crate::fixed::{UNIT, div_round, saturate};
 use crate::limits::{CapacityError, push};
 use crate::stage::contour::ContourPoint;
 use crate::stage::medial::MedialBall;
@@ -90,7 +90,7 @@ fn depth(
     // f^2 / (f^2 + rho^2) in Q2.30: f^2 < 2^46, so the shift stays below i128's range.
     let factor = ((i128::from(f2) << 30) / i128::from((f2 + rho2).max(1))) as i64;
     let offset = i64::from(optics.disparity_offset);
-    BallDepth { disparity: ((((matched + offset) * factor + (1 << 29)) >> 30) - offset) as i32, weight }
+    BallDepth { disparity: saturate((((matched + offset) * factor + (1 << 29)) >> 30) - offset), weight }
 }
 
 #[cfg(test)]

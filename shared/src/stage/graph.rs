@@ -96,6 +96,14 @@ pub struct Graph<'a> {
 }
 
 impl Graph<'_> {
+    /// Forget everything.
+    pub fn clear(&mut self) {
+        self.nodes.clear();
+        self.edges.clear();
+        self.path.clear();
+        self.members.clear();
+    }
+
     /// The pixels of an edge of this graph, from its first node to its second.
     pub fn pixels(&self, edge: &Edge) -> &[Pixel] {
         let start = edge.start as usize;

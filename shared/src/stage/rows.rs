@@ -71,10 +71,9 @@ pub struct RowStatistics {
     pub unmatched: u32,
 }
 
-/// Cost of leaving a crossing unmatched, 1/256 px.
+/// Cost of leaving a crossing unmatched, 1/256 px; two that lie twice as far apart than the plane says
+/// are therefore never paired.
 const SKIP: i32 = 6 * PX;
-/// Cost of a match at most, 1/256 px: a wrong plane must not forbid a match altogether.
-const COST_CAP: i32 = 30 * PX;
 /// Matches with a flatter normal than this say nothing about disparity (|n_x| in 1/16384).
 const MIN_NX: i32 = UNIT / 4;
 /// A match this far from the running median along the contour is a wrong one, 1/256 px.
@@ -168,14 +167,14 @@ pub struct Rows<'a> {
 }
 
 impl<'a> Rows<'a> {
-    /// The crossings of a row, at most [`ROW_CROSSINGS`].
-    pub fn row(&self, v: usize) -> &'a [RowCrossing] {
-        let row = self.all(v);
+    /// The crossings of a row that are matched: the first [`ROW_CROSSINGS`].
+    fn matched(&self, v: usize) -> &'a [RowCrossing] {
+        let row = self.row(v);
         &row[..row.len().min(ROW_CROSSINGS)]
     }
 
-    /// All crossings of a row.
-    fn all(&self, v: usize) -> &'a [RowCrossing] {
+    /// The crossings of a row.
+    pub fn row(&self, v: usize) -> &'a [RowCrossing] {
         match (self.first.get(v), self.first.get(v + 1)) {
             (Some(&a), Some(&b)) => self.crossings.get(a as usize..b as usize).unwrap_or(&[]),
             _ => &[],
@@ -214,15 +213,15 @@ pub fn match_rows(
     }
     let mut statistics = RowStatistics::default();
     for v in 0..left.len() {
-        let (a, b) = (left.row(v), right.row(v));
+        let (a, b) = (left.matched(v), right.matched(v));
         let mut known = 0;
         align(a, b, plane, |i, j| {
             known += u32::from(!left_points[a[i].index as usize].border);
             record(&a[i], &b[j], left_points, right_points, matches);
         });
         // Where either image ends, a missing partner says nothing.
-        let edges = left.all(v).iter().filter(|c| !left_points[c.index as usize].border).count() as u32;
-        let cut_off = right.all(v).iter().filter(|c| right_points[c.index as usize].border).count() as u32;
+        let edges = left.row(v).iter().filter(|c| !left_points[c.index as usize].border).count() as u32;
+        let cut_off = right.row(v).iter().filter(|c| right_points[c.index as usize].border).count() as u32;
         statistics.crossings += edges;
         statistics.unmatched += (edges - known).saturating_sub(cut_off);
     }
@@ -265,7 +264,7 @@ fn align(a: &[RowCrossing], b: &[RowCrossing], plane: &ImagePlane, mut pair: imp
             if cost[j] + SKIP < best {
                 (best, step) = (cost[j] + SKIP, Step::SkipRight);
             }
-            let together = diagonal + (y.u - expected).abs().min(COST_CAP);
+            let together = diagonal + (y.u - expected).abs();
             if x.downwards == y.downwards && together <= best {
                 (best, step) = (together, Step::Pair);
             }

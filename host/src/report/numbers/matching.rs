@@ -34,10 +34,13 @@ struct VerticalOffset {
 #[derive(Serialize)]
 struct Invariants {
     /// The cyclic shift of the least e_omega.
+    least_shift: usize,
+    /// The shift chosen: that of the least e_omega, but the rows' answer, 0, where both are tied.
     shift: usize,
-    /// Whether that is the rows' answer, 0.
+    /// Whether the least e_omega alone is at the rows' answer.
     agrees_with_rows: bool,
-    /// The least e_omega of another shift over that of the chosen one.
+    /// The least e_omega of another shift over that of the chosen one: below 1 for a tie that the rows
+    /// decide.
     margin: f64,
     /// For each shift, squared base-two logarithms.
     e_omega: Vec<f64>,
@@ -135,8 +138,9 @@ impl Invariants {
     fn of(cuts: &CutMatch, plane: &ImagePlane) -> Self {
         let residual = cuts.left.iter().zip(&cuts.right).map(|(a, b)| px((a.u - b.u - plane.at(*a)).abs()));
         Self {
+            least_shift: cuts.least,
             shift: cuts.shift,
-            agrees_with_rows: cuts.shift == 0,
+            agrees_with_rows: cuts.least == 0,
             margin: ratio(cuts.margin()),
             e_omega: cuts.errors.map(ratio).to_vec(),
             hull_residual_px: residual.sum::<f64>() / cuts.left.len() as f64,

@@ -1,0 +1,193 @@
+//! The pipeline: the only folder that chains stages.
+//!
+//! ```text
+//! each eye:  grey -> median -> threshold -> mask -> contour -> hull
+//!                                            mask -> distance -> skeleton -> graph, pruned
+//! the pair:  hulls -> invariants -> disparity plane -> row matching -> depth of each medial ball
+//!            graph + balls -> branches -> NURBS
+//! ```
+//!
+//! With [`Method::Paper`] the pair goes the paper's way instead: hulls of the pixels, the hulls' own
+//! vertices, an affine map, and the nearest right point of each mapped left one, for boundary and skeleton
+//! alike. Both methods run on the same stages.
+//!
+//! All memory is lent ([`Memory`]); what remains there afterwards is the result, and what passes by on the
+//! way can be seen by an [`Observer`]. Integers only: the same input gives the same bits everywhere.
+
+mod default;
+mod eye;
+mod finding;
+mod memory;
+mod observer;
+mod paper;
+
+pub use eye::object_box;
+pub use finding::{Finding, MAX_COVER};
+pub use memory::{Branch, EyeMemory, Memory, Scratch};
+pub use observer::{Observer, Product};
+pub use paper::PAPER_VERTICES;
+
+use crate::bitmap::{Grey, Size};
+use crate::fixed::{ONE, PX, div_round, saturate};
+use crate::limits::MAX_SIDE;
+use crate::stage::binarise::{Polarity, Threshold};
+use crate::stage::contour::ContourPoint;
+use crate::stage::correspond::{CutMatch, PaperMatching, VertexMatch};
+use crate::stage::depth::Optics;
+use crate::stage::nurbs::FitParams;
+use crate::stage::plane::ImagePlane;
+use crate::stage::prune::Pruning;
+use crate::stage::rows::RowStatistics;
+use crate::stage::thinning::Rule;
+use eye::{EyeFigures, see};
+use finding::{AREA_RATIO, Gates, MAX_OFFSET, MAX_TILT, MIN_OFFSET, NOTED_OFFSET};
+use heapless::Vec;
+
+/// One of the two eyes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// The left eye, in whose image the model is described.
+    Left,
+    /// The right eye.
+    Right,
+}
+
+/// How the two views are matched.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// Hulls cut at equal heights, row matching, depth from contour contacts; gates refuse.
+    Default,
+    /// As the paper's section 4.1 says; gates only warn.
+    Paper(PaperMatching),
+}
+
+/// Every choice of the pipeline.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Settings {
+    /// Whether a 3x3 median comes before the threshold.
+    pub median: bool,
+    /// Level between object and background.
+    pub threshold: Threshold,
+    /// Whether the object is bright or dark.
+    pub polarity: Polarity,
+    /// How the mask is thinned.
+    pub thinning: Rule,
+    /// Which branches of the skeleton go.
+    pub pruning: Pruning,
+    /// How branches become curves.
+    pub curves: FitParams,
+    /// How the views are matched.
+    pub method: Method,
+    /// The cameras.
+    pub optics: Optics,
+}
+
+impl Settings {
+    /// What works (docs/algorithm.md).
+    pub fn new(optics: Optics) -> Self {
+        Self {
+            median: true,
+            threshold: Threshold::Otsu,
+            polarity: Polarity::BrightObject,
+            thinning: Rule::EdtOrdered,
+            pruning: Pruning::default(),
+            curves: FitParams::default(),
+            method: Method::Default,
+            optics,
+        }
+    }
+
+    /// As literally as the paper's prose allows; branches shorter than 10 px are pruned.
+    pub fn paper(optics: Optics, matching: PaperMatching) -> Self {
+        Self {
+            median: false,
+            thinning: Rule::HitOrMiss,
+            pruning: Pruning::Length { px: 10 * PX },
+            method: Method::Paper(matching),
+            ..Self::new(optics)
+        }
+    }
+}
+
+/// How many findings a run can have.
+pub const MAX_FINDINGS: usize = 24;
+
+/// What a run says beside what it leaves in its memory.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Outcome {
+    /// Everything the user should know.
+    pub findings: Vec<Finding, MAX_FINDINGS>,
+    /// Areas of the object in both views, px.
+    pub areas: [u32; 2],
+    /// Right less left row of the object, 1/256 px, as corrected for.
+    pub vertical_offset: i32,
+    /// Right less left row of the highest and the lowest point, 1/256 px.
+    pub frontier_offsets: [i32; 2],
+    /// The object's disparity plane.
+    pub plane: ImagePlane,
+    /// The hulls, cut and matched (default method).
+    pub cuts: Option<CutMatch>,
+    /// The hulls' vertices, matched (paper's method).
+    pub vertices: Option<VertexMatch>,
+    /// How row matching went.
+    pub rows: RowStatistics,
+}
+
+/// Describe and match one rectified pair.
+///
+/// # Errors
+/// The first [`Finding`] that refuses; with [`Method::Paper`] only one that leaves nothing to go on with.
+pub fn run(
+    memory: &mut Memory<'_>,
+    left: Grey<'_>,
+    right: Grey<'_>,
+    settings: &Settings,
+    observer: &mut impl Observer,
+) -> Result<Outcome, Finding> {
+    let mut gates = Gates::new(settings);
+    if left.size() != right.size() {
+        let pair = |s: Size| (s.width, s.height);
+        gates.meet(Finding::SizesDiffer { left: pair(left.size()), right: pair(right.size()) })?;
+    }
+    memory.clear();
+    let [left_eye, right_eye] = &mut memory.eyes;
+    let scratch = &mut memory.scratch;
+    let figures = [
+        see(Side::Left, left, left_eye, scratch, settings, &mut gates, observer)?,
+        see(Side::Right, right, right_eye, scratch, settings, &mut gates, observer)?,
+    ];
+    compare(&figures, &mut gates)?;
+    match settings.method {
+        Method::Default => default::match_views(memory, left.size(), settings, &mut gates, observer)?,
+        Method::Paper(paper) => paper::match_as_paper(memory, left.size(), paper, &mut gates, observer)?,
+    }
+    Ok(gates.outcome)
+}
+
+/// Gates that look at both views; notes the vertical offset.
+fn compare([left, right]: &[EyeFigures; 2], gates: &mut Gates) -> Result<(), Finding> {
+    gates.outcome.areas = [left.area, right.area];
+    let ratio = saturate(div_round(i64::from(right.area) * i64::from(ONE), i64::from(left.area)));
+    if !AREA_RATIO.contains(&ratio) {
+        gates.meet(Finding::AreasDiffer(ratio))?;
+    }
+    let offset = |l: &ContourPoint, r: &ContourPoint| (!l.border && !r.border).then_some(r.at.v - l.at.v);
+    let offsets = (offset(&left.top, &right.top), offset(&left.bottom, &right.bottom));
+    let (top, bottom) = match offsets {
+        (Some(top), Some(bottom)) => (top, bottom),
+        (Some(one), None) | (None, Some(one)) => (one, one),
+        (None, None) => (0, 0),
+    };
+    gates.outcome.frontier_offsets = [top, bottom];
+    let mean = (top + bottom) / 2;
+    if mean.abs() > MAX_OFFSET || (top - bottom).abs() > MAX_TILT {
+        gates.meet(Finding::NotRectified { top, bottom })?;
+    }
+    if mean.abs() >= NOTED_OFFSET {
+        gates.meet(Finding::VerticalOffset(mean))?;
+    }
+    gates.outcome.vertical_offset = if mean.abs() < MIN_OFFSET { 0 } else { mean };
+    Ok(())
+}
+
+const _: () = assert!(MAX_SIDE <= 1 << 12, "coordinates are stated to be below 2^20");

@@ -1,0 +1,53 @@
+//! The paper's way to match two views: an affine map from the hulls' own vertices, then nearest points.
+
+use super::finding::Gates;
+use super::{Finding, Memory, Observer, Product, Side};
+use crate::bitmap::{Bitmap, Size};
+use crate::point::Pixel;
+use crate::stage::boundary::{Element, boundary};
+use crate::stage::branch::Sample;
+use crate::stage::correspond::{PaperMatching, match_vertices};
+use crate::stage::hull::{bitmap_extents, convex_hull};
+use crate::stage::nearest::pair_nearest;
+use heapless::VecView;
+
+/// The paper's reduced hulls have at most this many vertices: n^3 triples are looked at.
+pub const PAPER_VERTICES: usize = 24;
+
+/// The paper's way: an affine map from the hulls, then the nearest point for boundary and skeleton.
+pub(super) fn match_as_paper(
+    memory: &mut Memory<'_>,
+    size: Size,
+    paper: PaperMatching,
+    gates: &mut Gates,
+    observer: &mut impl Observer,
+) -> Result<(), Finding> {
+    let [left, right] = &mut memory.eyes;
+    for (eye, side) in [(&mut *left, Side::Left), (&mut *right, Side::Right)] {
+        let mask = Bitmap::over(size, eye.mask)?;
+        convex_hull(bitmap_extents(&mask), eye.hull)?;
+        observer.saw(Some(side), Product::Hull(eye.hull));
+    }
+    let matched = match_vertices(left.hull, right.hull, PAPER_VERTICES, paper).ok_or(Finding::NoMap)?;
+    observer.saw(None, Product::Vertices(&matched));
+    gates.outcome.vertices = Some(matched);
+
+    let words = size.words().min(memory.scratch.words.len());
+    let (a, b) = memory.scratch.words.split_at_mut(words);
+    let boundaries = [
+        boundary(&Bitmap::over(size, left.mask)?, Element::Square, a)?,
+        boundary(&Bitmap::over(size, right.mask)?, Element::Square, b)?,
+    ];
+    let points = |i: usize| boundaries[i].pixels().map(Pixel::centre);
+    pair_nearest(points(0), || points(1), &matched.map, memory.boundary_pairs)?;
+    let skeleton = |samples: &'_ VecView<Sample>, k: usize| samples[k].ball.at();
+    let (l, r) = (&*left.samples, &*right.samples);
+    pair_nearest(
+        (0..l.len()).map(|k| skeleton(l, k)),
+        || (0..r.len()).map(|k| skeleton(r, k)),
+        &matched.map,
+        memory.skeleton_pairs,
+    )?;
+    observer.saw(None, Product::Pairs(memory.boundary_pairs, memory.skeleton_pairs));
+    Ok(())
+}
