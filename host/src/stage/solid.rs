@@ -5,7 +5,6 @@
 //! object as well. Neighbours are balls grown from neighbouring contour points, or next to each other on a
 //! curve, whose centres lie close in the image and in depth: where the axis branches or jumps there is no
 //! cone.
-
 //!
 //! Contour points around a round part of the object all have nearly the same ball. Those that stick out of
 //! a larger one by less than a twentieth of a pixel add nothing but the noise of their radii and are left out: a
