@@ -81,6 +81,17 @@ pub enum Pieces {
     Balls,
 }
 
+/// How much is made of the pictures.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Profile {
+    /// Everything: contours between pixels, depth refined by tangent planes.
+    #[default]
+    Full,
+    /// What a small device has: contours of the mask alone, depth from the contacts alone.
+    Device,
+}
+
 /// The choices of a reconstruction.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Options {
@@ -88,6 +99,8 @@ pub struct Options {
     pub mode: Mode,
     /// Thinning rule, if not the mode's own.
     pub thinning: Option<Rule>,
+    /// How much is made of the pictures (default mode).
+    pub profile: Profile,
     /// Which balls make the solid (default mode).
     pub skeleton: Skeleton,
     /// Edges that pruning leaves of the skeleton, if not as many as stand out.
@@ -268,6 +281,7 @@ fn core_settings(optics: Optics, options: &Options) -> Settings {
     Settings {
         threshold: options.threshold,
         polarity: options.polarity,
+        sub_pixel: options.profile == Profile::Full,
         thinning: options.thinning.unwrap_or(chosen.thinning),
         pruning: options.branches.map_or(chosen.pruning, Pruning::Branches),
         ..chosen
@@ -343,7 +357,9 @@ fn grow(
         }
         Skeleton::Nurbs => curve_balls(camera, &edges, eye.branches, eye.controls)?,
     };
-    refine(camera, &edges, &mut grown);
+    if options.profile == Profile::Full {
+        refine(camera, &edges, &mut grown);
+    }
     clock.lap("refine");
     smooth(&mut grown, &outcome.plane);
     clock.lap("smooth");

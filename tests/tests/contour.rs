@@ -17,7 +17,7 @@ fn outline(picture: &Picture) -> (Vec<ContourPoint>, Vec<ContourLoop>, Image) {
     let mut points = Box::new(List::<_, 16384>::new());
     let mut loops = Box::new(List::<_, 4096>::new());
     let grey = Grey::new(size, size.width, &bytes).unwrap();
-    contour(grey, &mask, &mut seen, &mut *cracks, &mut *points, &mut *loops).unwrap();
+    contour(Some(grey), &mask, &mut seen, &mut *cracks, &mut *points, &mut *loops).unwrap();
     (points.to_vec(), loops.to_vec(), image)
 }
 

@@ -10,7 +10,7 @@ use shared::stage::thinning::Rule;
 
 use super::{Cli, Failure};
 use crate::calibration::StereoCamera;
-use crate::reconstruct::{self, Options, Pieces, Radius, Skeleton};
+use crate::reconstruct::{self, Options, Pieces, Profile, Radius, Skeleton};
 use crate::report::words::{parse_polarity, parse_rule, parse_threshold};
 use crate::source::Pair;
 
@@ -39,6 +39,9 @@ pub struct MethodArgs {
     /// How the outline is thinned [default: edt, or hit-or-miss with --mode paper]
     #[arg(long, value_parser = parse_rule, value_name = "edt|hit-or-miss|zhang-suen|guo-hall")]
     thinning: Option<Rule>,
+    /// All that the pictures have, or what a small device makes of them [default: full]
+    #[arg(long, value_enum, hide_possible_values = true, value_name = "full|device")]
+    profile: Option<Profile>,
     /// Balls at every contour point, or along the curves of the skeleton [default: full]
     #[arg(long, value_enum, hide_possible_values = true, value_name = "full|nurbs")]
     skeleton: Option<Skeleton>,
@@ -84,6 +87,7 @@ impl MethodArgs {
         Ok(Options {
             mode,
             thinning: self.thinning,
+            profile: self.profile.unwrap_or_default(),
             skeleton: self.skeleton.unwrap_or_default(),
             branches: self.branches,
             radius: self.radius.unwrap_or_default(),

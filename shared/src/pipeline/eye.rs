@@ -43,7 +43,8 @@ pub(super) fn see(
 
     let (seen, _) = scratch.words.split_at_mut(size.words().min(scratch.words.len()));
     saw(Product::Boundary(&boundary(&mask, Element::Square, seen)?));
-    contour(grey, &mask, &mut Bitmap::new(size, seen)?, scratch.edges, eye.contour, eye.loops)?;
+    let edges = settings.sub_pixel.then_some(grey);
+    contour(edges, &mask, &mut Bitmap::new(size, seen)?, scratch.edges, eye.contour, eye.loops)?;
     saw(Product::Contour(eye.contour, eye.loops));
     if eye.contour.iter().any(|p| p.border) {
         gates.meet(Finding::TouchesBorder(side))?;

@@ -70,6 +70,8 @@ pub struct Settings {
     pub threshold: Threshold,
     /// Whether the object is bright or dark.
     pub polarity: Polarity,
+    /// Whether the contour follows the grey values between pixels, or the mask alone.
+    pub sub_pixel: bool,
     /// How the mask is thinned.
     pub thinning: Rule,
     /// Which branches of the skeleton go.
@@ -89,6 +91,7 @@ impl Settings {
             median: true,
             threshold: Threshold::Otsu,
             polarity: Polarity::BrightObject,
+            sub_pixel: true,
             thinning: Rule::EdtOrdered,
             pruning: Pruning::default(),
             curves: FitParams::default(),

@@ -3,7 +3,7 @@
 //! Paper section 3.2 keeps the boundary's pixels; depth needs it to a fraction of a pixel,
 //! since one pixel of disparity is millimetres of depth.
 //!
-//! * **In**: the grey image and the cleaned mask, both of one size.
+//! * **In**: the cleaned mask and, for sub-pixel edges, the grey image, both of one size.
 //! * **Out**: points every pixel of arc, in loops that keep the object on their right as seen on the
 //!   screen (the outer loop runs clockwise, holes the other way), each with its outward normal.
 //! * **How**: the loop follows the cracks between set and clear pixels of the mask, so it is closed and
@@ -74,14 +74,15 @@ const MIN_CONTRAST: i32 = 8;
 /// k g(k) of a Gaussian of 1.5 px, in 1/64: the derivative that gives tangents.
 const TANGENT: [i32; 5] = [51, 53, 26, 7, 1];
 
-/// Trace all loops of `mask` and sample them at about 1 px of arc.
+/// Trace all loops of `mask` and sample them at about 1 px of arc. Without a grey image edges lie in the
+/// middle between pixels, softened.
 ///
 /// `seen` is a scratch bitmap of the mask's size, `crossings` scratch for the longest loop.
 ///
 /// # Errors
 /// A [`CapacityError`] when a list is too short; `points` and `loops` are then incomplete.
 pub fn contour(
-    grey: Grey<'_>,
+    grey: Option<Grey<'_>>,
     mask: &Bitmap<'_>,
     seen: &mut Bitmap<'_>,
     crossings: &mut VecView<EdgeCrossing>,
@@ -99,6 +100,9 @@ pub fn contour(
                 let u = (i * crate::bitmap::WORD_BITS + bit) as i32;
                 if !seen.get(u, v) {
                     trace(grey, mask, (u, v), seen, crossings)?;
+                    if grey.is_none() {
+                        soften(crossings);
+                    }
                     resample(crossings, points, loops)?;
                 }
             }
@@ -109,7 +113,7 @@ pub fn contour(
 
 /// Follow the cracks from the north side of pixel `start` until back there.
 fn trace(
-    grey: Grey<'_>,
+    grey: Option<Grey<'_>>,
     mask: &Bitmap<'_>,
     start: (i32, i32),
     seen: &mut Bitmap<'_>,
@@ -138,8 +142,25 @@ fn trace(
     }
 }
 
+/// Take the steps of a few pixels off a staircase: each point moves to the mean of itself and its two
+/// neighbours, itself counting twice.
+fn soften(crossings: &mut [EdgeCrossing]) {
+    let (Some(first), Some(last)) = (crossings.first().map(|c| c.at), crossings.last().map(|c| c.at)) else {
+        return;
+    };
+    let mut before = last;
+    for i in 0..crossings.len() {
+        let here = crossings[i].at;
+        let after = crossings.get(i + 1).map_or(first, |c| c.at);
+        let mean = |a: i32, b: i32, c: i32| (a + 2 * b + c + 2) >> 2;
+        crossings[i].at =
+            PixelPoint { u: mean(before.u, here.u, after.u), v: mean(before.v, here.v, after.v) };
+        before = here;
+    }
+}
+
 /// Where along `axis` the edge lies near the outer side of `pixel`.
-fn place(grey: Grey<'_>, mask: &Bitmap<'_>, pixel: (i32, i32), axis: (i32, i32)) -> EdgeCrossing {
+fn place(grey: Option<Grey<'_>>, mask: &Bitmap<'_>, pixel: (i32, i32), axis: (i32, i32)) -> EdgeCrossing {
     let at = |k: i32| (pixel.0 + k * axis.0, pixel.1 + k * axis.1);
     let run = |first: i32, step: i32, inside: bool| {
         (0..REACH as i32)
@@ -151,7 +172,7 @@ fn place(grey: Grey<'_>, mask: &Bitmap<'_>, pixel: (i32, i32), axis: (i32, i32))
     };
     let (inner, outer) = (run(0, -1, true), run(1, 1, false));
     let mut shift = 0;
-    if outer > 0 {
+    if let Some(grey) = grey.filter(|_| outer > 0) {
         let level = |k: i32| {
             let (u, v) = at(k);
             i32::from(grey.get(u, v))
@@ -250,7 +271,7 @@ mod tests {
             let (mut raw, mut points, mut loops) =
                 (Vec::<_, 1024>::new(), Vec::<_, 1024>::new(), Vec::<_, 4>::new());
             let image = Grey::new(size, 64, &grey).unwrap();
-            contour(image, &mask, &mut seen, &mut raw, &mut points, &mut loops).unwrap();
+            contour(Some(image), &mask, &mut seen, &mut raw, &mut points, &mut loops).unwrap();
             assert_eq!(loops.len(), 1);
             let mut square_sum = 0.0;
             for p in &points {
@@ -291,7 +312,7 @@ mod tests {
         let (mut raw, mut points, mut loops) =
             (Vec::<_, 256>::new(), Vec::<_, 256>::new(), Vec::<_, 8>::new());
         let image = Grey::new(mask.size(), 7, &grey).unwrap();
-        contour(image, &mask, &mut seen, &mut raw, &mut points, &mut loops).unwrap();
+        contour(Some(image), &mask, &mut seen, &mut raw, &mut points, &mut loops).unwrap();
         assert_eq!(loops.len(), 4, "ring outside, ring inside, dot, bar");
         assert!(points.iter().any(|p| p.border) && points.iter().any(|p| !p.border));
     }

@@ -2,7 +2,7 @@
 
 use super::super::{Run, words};
 use crate::calibration::Camera;
-use crate::reconstruct::{Mode, Pieces, Radius, Skeleton, settings};
+use crate::reconstruct::{Mode, Pieces, Profile, Radius, Skeleton, settings};
 use crate::stage::balls::px;
 use serde::Serialize;
 use shared::fixed::ONE;
@@ -28,6 +28,8 @@ pub(super) struct Choices {
     pruning: &'static str,
     pruning_px: Option<f64>,
     pruning_branches: Option<u16>,
+    /// How much is made of the pictures, in default mode.
+    profile: Option<Profile>,
     /// Which balls make the solid, in default mode.
     skeleton: Option<Skeleton>,
     /// How far they reach, in default mode.
@@ -72,6 +74,7 @@ impl Choices {
             pruning,
             pruning_px,
             pruning_branches,
+            profile: omega.is_none().then_some(run.options.profile),
             skeleton: omega.is_none().then_some(run.options.skeleton),
             radius: omega.is_none().then_some(run.options.radius),
             surface: omega.is_none().then_some(run.options.pieces),
