@@ -67,7 +67,12 @@ type Limb = (Part, &'static [[f64; 4]], f64);
 const LIMBS: [Limb; 10] = [
     (
         Part::Middle,
-        &[[-48.0, 66.0, 0.0, 20.0], [-18.0, 63.0, 0.0, 21.0], [10.0, 64.0, 0.0, 21.0], [30.0, 68.0, 0.0, 19.0]],
+        &[
+            [-48.0, 66.0, 0.0, 20.0],
+            [-18.0, 63.0, 0.0, 21.0],
+            [10.0, 64.0, 0.0, 21.0],
+            [30.0, 68.0, 0.0, 19.0],
+        ],
         1.0,
     ),
     (Part::Middle, &[[32.0, 72.0, 0.0, 16.0], [46.0, 86.0, 0.0, 13.0], [54.0, 97.0, 0.0, 11.5]], 10.0),
@@ -110,7 +115,8 @@ pub fn nearest_part() -> impl Fn(&Point3<f64>) -> Part + Sync {
     let turn = pose();
     move |p| {
         let q = upright(&Point3::from(turn.tr_mul(&(p - PLACE))));
-        let nearest = limbs.iter().map(|(part, limb)| (limb.at(&q), *part)).min_by(|a, b| a.0.total_cmp(&b.0));
+        let nearest =
+            limbs.iter().map(|(part, limb)| (limb.at(&q), *part)).min_by(|a, b| a.0.total_cmp(&b.0));
         nearest.map_or(Part::Middle, |(_, part)| part)
     }
 }
