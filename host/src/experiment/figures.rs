@@ -41,8 +41,8 @@ pub(super) fn noise(folder: &Path, subject: &Subject, study: &Study) -> io::Resu
     let middle = subject.truth.bounds().map(|[low, high]| nalgebra::center(&low, &high));
     let photograph = |eye: usize| {
         let view = Calibrated::pair(&subject.calibration)[eye];
-        let column = middle.and_then(|middle| view.project(&middle)).map_or(0.0, |(u, _)| u);
-        square(&subject.images[eye], column as u32)
+        let centre = middle.and_then(|middle| view.project(&middle)).unwrap_or_default();
+        square(&subject.images[eye], centre.into())
     };
     let mut row: Vec<(String, GrayImage)> =
         vec![("left image".to_owned(), photograph(0)), ("right image".to_owned(), photograph(1))];

@@ -28,7 +28,7 @@ use study::{Subject, study};
 pub struct Effort {
     /// Shapes, in the order of the table.
     pub shapes: Vec<Shape>,
-    /// Edges of the true meshes, in the shapes' own cells.
+    /// Cell of the true meshes, times the shapes' own.
     pub truth: f64,
     /// Grid spacing of the models, mm, if not their own.
     pub cell: Option<f64>,

@@ -82,19 +82,17 @@ fn models(page: &mut String, found: &Experiments) {
         let Some(error) = study(found, name).and_then(|study| study.error(Way::Full)) else { continue };
         say(page, &format!("**Figure {number}: {name}.** The model is {:.2} mm off on average.", error[0]));
         say(page, &format!("![{name}]({name}/pictures/model.png)"));
-    }
-    if let (Some(noisy), Some(clean)) = (
-        study(found, "torus_noise").and_then(|study| study.error(Way::Full)),
-        study(found, "torus").and_then(|study| study.error(Way::Full)),
-    ) {
-        say(
-            page,
-            &format!(
-                "**Figure 9: the torus in noise** of 20 grey levels with 2 % salt and pepper. The model is {:.2} mm off, against {:.2} mm without noise.",
-                noisy[0], clean[0]
-            ),
-        );
-        say(page, "![noise](figures/fig-09-noise.png)");
+        let noisy = study(found, &format!("{name}_noise")).and_then(|study| study.error(Way::Full));
+        if let Some(noisy) = noisy {
+            say(
+                page,
+                &format!(
+                    "**Figure 9: the {name} in noise** of 20 grey levels with 2 % salt and pepper. The model is {:.2} mm off, against {:.2} mm without noise.",
+                    noisy[0], error[0]
+                ),
+            );
+            say(page, "![noise](figures/fig-09-noise.png)");
+        }
     }
 }
 

@@ -20,6 +20,9 @@ use crate::shape::Shape;
 use crate::stage::rectify::Rectification;
 use crate::view::Calibrated;
 
+/// Diagonal of a model, in those of the truth, up to which there is a point in measuring it.
+const MOST_TIMES: f64 = 20.0;
+
 /// A way from a pair to a solid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Way {
@@ -176,8 +179,22 @@ pub(super) fn study(subject: &Subject, effort: &Effort, folder: &Path) -> Result
             baseline(subject, &record, |outlines, camera| inflation(outlines, camera, effort.baseline_cell))
         }
     };
-    let found = |way: Way| mesh(way).map(|mesh| Found { evaluation: subject.measure(&mesh, effort), mesh });
+    let found = |way: Way| {
+        let mesh = mesh(way)?;
+        sane(&mesh, &subject.truth)?;
+        Ok(Found { evaluation: subject.measure(&mesh, effort), mesh })
+    };
     Ok(Study { name: subject.name.clone(), ways: Way::ALL.map(|way| (way, found(way))).into() })
+}
+
+/// Whether a model can be compared at all: balls that fly apart make a solid of kilometres.
+fn sane(model: &Mesh, truth: &Mesh) -> Result<(), String> {
+    let diagonal = |mesh: &Mesh| mesh.bounds().map_or(0.0, |[low, high]| (high - low).norm());
+    let times = diagonal(model) / diagonal(truth);
+    if times > MOST_TIMES {
+        return Err(format!("its balls fly apart: the solid is {times:.0} times as large as the object"));
+    }
+    Ok(())
 }
 
 /// A baseline's mesh from the outlines that were recorded, in the left camera's axes.

@@ -34,11 +34,12 @@ pub(crate) fn look(mesh: &Mesh, frame: &Mesh, from: From) -> Option<GrayImage> {
     shaded(mesh, (nalgebra::center(&low, &high), (high - low).max() / 2.0), &from.turn())
 }
 
-/// The square of an image, as high as it, around a column.
-pub(crate) fn square(image: &GrayImage, column: u32) -> GrayImage {
-    let side = image.height().min(image.width());
-    let first = column.saturating_sub(side / 2).min(image.width() - side);
-    let cut = image::imageops::crop_imm(image, first, 0, side, side).to_image();
+/// A square of an image, five eighths of its height, around a pixel.
+pub(crate) fn square(image: &GrayImage, centre: [f64; 2]) -> GrayImage {
+    let size = [image.width(), image.height()];
+    let side = (image.height() * 5 / 8).min(image.width());
+    let [x, y] = [0, 1].map(|k| (centre[k] as u32).saturating_sub(side / 2).min(size[k] - side));
+    let cut = image::imageops::crop_imm(image, x, y, side, side).to_image();
     image::imageops::resize(&cut, SIDE, SIDE, FilterType::CatmullRom)
 }
 
