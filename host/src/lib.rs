@@ -20,10 +20,12 @@ pub mod output;
 // What the user asks for.
 pub mod command;
 
-// What it is compared with: built-in solids, rendered and measured.
+// What it is compared with: built-in solids, rendered and measured, and simpler methods.
 pub mod shape;
 pub mod view;
 pub mod bvh;
 pub mod random;
 pub mod render;
 pub mod evaluate;
+pub mod baseline;
+pub mod experiment;

@@ -111,12 +111,7 @@ impl Stage<'_> {
     }
 
     fn picture(&self, name: &str, picture: &RgbImage) -> Result<String, ExportError> {
-        let mut bytes = Vec::new();
-        // Flat colours compress well enough at the least effort, which is several times as fast.
-        let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Up);
-        picture
-            .write_with_encoder(encoder)
-            .map_err(|error| failed(&self.folder.join(name), io::Error::other(error)))?;
+        let bytes = png(picture).map_err(|error| failed(&self.folder.join(name), error))?;
         self.bytes(name, &bytes)
     }
 
@@ -144,6 +139,15 @@ impl Stage<'_> {
         }
         Ok(())
     }
+}
+
+/// A drawn picture as a file. Flat colours compress well enough at the least effort, which is several
+/// times as fast.
+pub(crate) fn png(picture: &RgbImage) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Up);
+    picture.write_with_encoder(encoder).map_err(io::Error::other)?;
+    Ok(bytes)
 }
 
 fn write_curves(path: &Path, curves: &Curves, comments: &[&str]) -> Result<(), ExportError> {

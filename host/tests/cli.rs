@@ -389,3 +389,39 @@ fn help_shows_how() {
     }
     assert_eq!(good(Path::new("."), &["--version"]), concat!("host ", env!("CARGO_PKG_VERSION"), "\n"));
 }
+
+#[test]
+fn experiments_leave_a_page_its_figures_and_their_numbers() {
+    let folder = TempDir::new().unwrap();
+    let told = json(&good(folder.path(), &["experiments", "--quick", "--json"]));
+    let left = folder.path().join("ossature-experiments");
+    assert_eq!(json(&fs::read_to_string(left.join("experiments.json")).unwrap()), told);
+    let mut names: Vec<_> = fs::read_dir(&left).unwrap().map(|e| e.unwrap().file_name()).collect();
+    names.sort();
+    assert_eq!(names, ["animal", "experiments.json", "experiments.md", "figures", "torus", "torus_noise"]);
+    // Every file that the page shows is there.
+    let page = fs::read_to_string(left.join("experiments.md")).unwrap();
+    let links: Vec<_> =
+        page.split("](").skip(1).map(|rest| rest.split(')').next().unwrap_or_default()).collect();
+    assert!(links.len() > 15, "{links:?}");
+    for link in links {
+        assert!(left.join(link).is_file(), "{link}");
+    }
+    let error = |shape: usize, way: &str| {
+        told["shapes"][shape]["ways"][way]["distance"]["symmetric"]["mean_mm"].as_f64().unwrap_or(f64::NAN)
+    };
+    assert_eq!(told["shapes"][0]["name"], "torus");
+    for shape in 0..3 {
+        for baseline in ["visual_hull", "inflation"] {
+            assert!(error(shape, "full") < error(shape, baseline), "{shape}, {baseline}");
+            assert_eq!(told["shapes"][shape]["ways"][baseline]["closed"], true, "{shape}, {baseline}");
+        }
+    }
+    assert!(error(0, "full") < 0.2 && error(0, "full") < error(0, "paper"));
+    let parts = told["parts"].as_array().unwrap();
+    assert_eq!(parts.len(), 2 + 2 + 4 + 6);
+    assert!(parts.iter().all(|row| row["mean_mm"]["full"].as_f64().is_some_and(|mm| mm < 8.0)), "{parts:?}");
+    let missing = |point: &Value| point["missing_mm"].as_f64().unwrap();
+    let branches = told["branches"].as_array().unwrap();
+    assert!(3.0 * missing(&branches[3]) < missing(&branches[0]), "{branches:?}");
+}

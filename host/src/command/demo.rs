@@ -1,7 +1,7 @@
 //! A model from a built-in pair, held against the truth: no camera, no files, no network.
 //!
-//! Renders a shape (torus, torus_tilt, sphere, capsule, screwdriver, block, teapot or mouse), reconstructs
-//! it from the two images alone, and measures how far the model is from the shape. Leaves the images,
+//! Renders a shape (torus, torus_tilt, sphere, capsule, screwdriver, block, teapot, mouse or animal),
+//! reconstructs it from the two images alone, and measures how far the model is from the shape. Leaves the images,
 //! calib.yaml, truth.ply, model.ply, skeleton.ply, boundary.ply, report.json and pictures.
 //!
 //! Examples:

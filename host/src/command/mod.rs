@@ -8,12 +8,14 @@
 //!   host replay recordings/ --out models    every pair in a folder
 //!   host render mesh.obj --out pair         a pair of any mesh that you have
 //!   host evaluate model.ply truth.ply       how far a model is from the truth
+//!   host experiments                        the paper's experiments, rerun
 //!
 //! Exit codes: 0 done, 1 refused or failed, 2 wrong usage.
 
 pub mod completions;
 pub mod demo;
 pub mod evaluate;
+pub mod experiments;
 pub mod inspect;
 mod batch;
 mod model;
@@ -59,6 +61,9 @@ enum Command {
     /// How far a model is from the truth
     #[command(long_about = page(include_str!("evaluate.rs")))]
     Evaluate(evaluate::Args),
+    /// The paper's experiments on built-in shapes
+    #[command(long_about = page(include_str!("experiments.rs")))]
+    Experiments(experiments::Args),
     /// One stage of one view, drawn and timed
     #[command(long_about = page(include_str!("inspect.rs")))]
     Inspect(inspect::Args),
@@ -79,6 +84,7 @@ impl Cli {
             Command::Demo(args) => demo::run(args),
             Command::Render(args) => render::run(args),
             Command::Evaluate(args) => evaluate::run(args),
+            Command::Experiments(args) => experiments::run(args),
             Command::Inspect(args) => inspect::run(args),
             Command::Completions(args) => completions::run(args),
         }

@@ -1,6 +1,6 @@
 //! A stereo pair of any mesh: try what the method makes of an object before building anything.
 //!
-//! WHAT is a built-in shape (sphere, torus, torus_tilt, capsule, screwdriver, block, teapot, mouse) or a
+//! WHAT is a built-in shape (sphere, torus, torus_tilt, capsule, screwdriver, block, teapot, mouse, animal) or a
 //! mesh file: PLY, OBJ or STL. A file's unit is taken for a millimetre (see --scale). A mesh is moved to
 //! the middle of what both cameras see; a built-in shape stands there already. The cameras are an ideal
 //! pair, or those of --calib, with its lenses and its turn.

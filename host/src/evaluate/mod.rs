@@ -20,7 +20,7 @@ mod topology;
 mod volume;
 
 pub use distance::{Deviation, Distances};
-pub use sections::{Section, Sections};
+pub use sections::{Section, Sections, sections_of};
 
 /// How finely to measure.
 #[derive(Clone, Copy, Debug, PartialEq)]

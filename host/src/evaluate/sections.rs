@@ -46,18 +46,7 @@ pub struct Sections {
 /// The table of `count` sections.
 pub(super) fn sections(model: &Mesh, truth: &Mesh, count: usize) -> Sections {
     let axis = long_axis(truth);
-    let heights = truth.vertices.iter().map(|v| v.coords.dot(&axis));
-    let (low, high) =
-        heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), h| (low.min(h), high.max(h)));
-    let row = |i: usize| {
-        let height = low + (i as f64 + 0.5) / count as f64 * (high - low);
-        let points = [model, truth].map(|mesh| outline(mesh, &axis, height));
-        let met = points.iter().all(|points| !points.is_empty());
-        let [to_truth, to_model] =
-            [(0, 1), (1, 0)].map(|(a, b)| met.then(|| mean_distance(&points[a], &points[b])));
-        Section { section: i + 1, model_to_truth_mm: to_truth, truth_to_model_mm: to_model }
-    };
-    let rows: Vec<Section> = (0..count).into_par_iter().map(row).collect();
+    let rows = sections_of(model, truth, &axis, count, &|_| true);
     let found: Vec<f64> = rows.iter().filter_map(|row| row.model_to_truth_mm).collect();
     Sections {
         axis: axis.into(),
@@ -65,6 +54,30 @@ pub(super) fn sections(model: &Mesh, truth: &Mesh, count: usize) -> Sections {
         mean_mm: (!found.is_empty()).then(|| found.iter().sum::<f64>() / found.len() as f64),
         rows,
     }
+}
+
+/// The sections of a part of the truth, in the middle of `count` equal slices of it across `axis` (a unit
+/// vector). Distances run from the points that belong to the part to all of the other outline.
+pub fn sections_of(
+    model: &Mesh,
+    truth: &Mesh,
+    axis: &Vector3<f64>,
+    count: usize,
+    belongs: &(impl Fn(&Point3<f64>) -> bool + Sync),
+) -> Vec<Section> {
+    let heights = truth.vertices.iter().filter(|v| belongs(v)).map(|v| v.coords.dot(axis));
+    let (low, high) =
+        heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), h| (low.min(h), high.max(h)));
+    let row = |i: usize| {
+        let height = low + (i as f64 + 0.5) / count as f64 * (high - low);
+        let points = [model, truth].map(|mesh| outline(mesh, axis, height));
+        let [to_truth, to_model] = [(0, 1), (1, 0)].map(|(from, to)| {
+            let own: Vec<_> = points[from].iter().copied().filter(belongs).collect();
+            (!own.is_empty() && !points[to].is_empty()).then(|| mean_distance(&own, &points[to]))
+        });
+        Section { section: i + 1, model_to_truth_mm: to_truth, truth_to_model_mm: to_model }
+    };
+    (0..count).into_par_iter().map(row).collect()
 }
 
 /// Principal axis of the surface; the longest side of its box where the first two spreads are alike.

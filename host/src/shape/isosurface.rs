@@ -34,7 +34,7 @@ type Edge = u64;
 
 /// The zero level of `field` inside the box `bounds`, in cells of `cell` mm (raised, if need be, to
 /// 1/2048 of the box's longest side).
-pub(super) fn isosurface(
+pub(crate) fn isosurface(
     field: &(impl Fn(&Point3<f64>) -> f64 + Sync + ?Sized),
     bounds: [Point3<f64>; 2],
     cell: f64,

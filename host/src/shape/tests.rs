@@ -132,6 +132,6 @@ fn names_are_parsed_and_a_wrong_one_lists_the_right_ones() {
     }
     let error = "kettle".parse::<Shape>().expect_err("no such shape");
     let expected = "there is no shape `kettle`; the shapes are \
-                    sphere, torus, torus_tilt, capsule, screwdriver, block, teapot, mouse";
+                    sphere, torus, torus_tilt, capsule, screwdriver, block, teapot, mouse, animal";
     assert_eq!(error.to_string(), expected);
 }

@@ -4,9 +4,11 @@
 mod canvas;
 mod colour;
 pub(crate) mod eye;
+pub(crate) mod gallery;
 mod model;
 mod pair;
 mod panel;
+pub(crate) mod plot;
 
 use super::Run;
 use crate::reconstruct::Mode;

@@ -12,7 +12,7 @@ use image::{DynamicImage, GrayImage, RgbImage};
 use nalgebra::{Matrix3, Point3};
 
 /// Side of a view, px.
-const SIDE: u32 = 360;
+pub(super) const SIDE: u32 = 360;
 /// Rays a pixel along each axis.
 const RAYS: u32 = 2;
 /// Part of a view that the longest side of the model's box fills.
@@ -68,7 +68,7 @@ fn photograph(eye: &Eye) -> Option<GrayImage> {
 }
 
 /// A shaded view of a mesh, turned about the middle of the `cube` (centre and half a side, mm) around it.
-fn shaded(mesh: &Mesh, cube: (Point3<f64>, f64), turn: &Matrix3<f64>) -> Option<GrayImage> {
+pub(super) fn shaded(mesh: &Mesh, cube: (Point3<f64>, f64), turn: &Matrix3<f64>) -> Option<GrayImage> {
     let (centre, half) = cube;
     let turned = Mesh {
         vertices: mesh.vertices.iter().map(|p| centre + turn * (p - centre)).collect(),
