@@ -10,7 +10,8 @@
 //!
 //! Lengths are millimetres in the left camera's axes. Everything is made in a temporary folder inside the
 //! target and moved only when all of it is complete; when something fails before that, the target is left
-//! as it was. Pictures of an earlier run that this one did not draw are removed, so that a folder speaks of
+//! as it was. Files are moved one after the other: if the system refuses one of these moves, those before it
+//! are new and the rest old. Pictures of an earlier run that this one did not draw are removed, so that a folder speaks of
 //! one run; files of other names are not touched.
 
 use crate::export::ExportError;
@@ -20,11 +21,12 @@ use crate::report::{Run, numbers, pictures};
 use image::RgbImage;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use rayon::prelude::*;
-use std::io;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use tempfile::NamedTempFile;
 
 /// Sub-folder of the pictures.
-const PICTURES: &str = "pictures";
+pub(crate) const PICTURES: &str = "pictures";
 
 /// Write all files of a run into `folder`, which is created if it is missing.
 ///
@@ -40,6 +42,38 @@ pub fn write(folder: &Path, run: &Run<'_>) -> Result<(), ExportError> {
         }
     }
     result
+}
+
+/// Whether a folder holds what a run left.
+pub(crate) fn is_result(folder: &Path) -> bool {
+    ["model.ply", "report.json"].iter().all(|name| folder.join(name).is_file())
+}
+
+/// Creates or replaces files, whose folders exist. All are complete beside their final names before the
+/// first is moved there.
+pub(crate) fn write_together(files: &[(&Path, Vec<u8>)]) -> Result<(), ExportError> {
+    let staged = files.iter().map(|(path, bytes)| beside(path, bytes).map_err(|source| failed(path, source)));
+    let staged = staged.collect::<Result<Vec<_>, _>>()?;
+    for ((path, _), file) in files.iter().zip(staged) {
+        file.persist(path).map_err(|error| failed(path, error.error))?;
+    }
+    Ok(())
+}
+
+/// A file beside `path` that can be moved there.
+fn beside(path: &Path, bytes: &[u8]) -> io::Result<NamedTempFile> {
+    if path.exists() && !path.is_file() {
+        return Err(io::Error::other("what has that name is no file"));
+    }
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".unfinished-");
+    // A temporary file is private; a picture is as readable as any other file.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let mut file = builder.tempfile_in(folder)?;
+    file.write_all(bytes)?;
+    Ok(file)
 }
 
 /// Create a folder and its parents; returns those that were missing, outermost first.
@@ -187,6 +221,25 @@ mod tests {
         write(&folder, &Capsule::new(Mode::Default, Record::figures_only()).run()).unwrap();
         assert_eq!(names(&folder), files);
         assert_eq!(names(&folder.join(PICTURES)), ["mine.png"]);
+    }
+
+    #[test]
+    fn files_come_together_or_not_at_all() {
+        let parent = tempfile::tempdir().unwrap();
+        let (first, second) = (parent.path().join("a"), parent.path().join("none/b"));
+        fs::write(&first, "old").unwrap();
+        let files = |second| [(first.as_path(), b"new".to_vec()), (second, b"new".to_vec())];
+        for second in [&second, parent.path()] {
+            let error = write_together(&files(second)).unwrap_err().to_string();
+            assert!(error.contains(second.to_str().unwrap()), "{error}");
+            assert_eq!(
+                (names(parent.path()), fs::read(&first).unwrap()),
+                (vec!["a".into()], b"old".to_vec())
+            );
+        }
+        write_together(&files(&parent.path().join("b"))).unwrap();
+        assert_eq!(names(parent.path()), ["a", "b"]);
+        assert_eq!(fs::read(&first).unwrap(), b"new");
     }
 
     #[test]

@@ -243,9 +243,58 @@ fn one_refused_pair_does_not_stop_the_others() {
 }
 
 #[test]
+fn results_beside_their_pairs_do_not_hide_them() {
+    let folder = TempDir::new().unwrap();
+    for pair in ["many/a", "many/b"] {
+        fs::create_dir_all(folder.path().join(pair)).unwrap();
+        for file in ["left.png", "right.png", "calib.yaml"] {
+            fs::copy(torus(file), folder.path().join(pair).join(file)).unwrap();
+        }
+    }
+    for _ in 0..2 {
+        let told = good(folder.path(), &["replay", "many", "--out", "many", "--json", "--jobs", "65535"]);
+        assert_eq!(json(&told)["pairs"].as_array().unwrap().len(), 2);
+        assert!(folder.path().join("many/a/pictures").is_dir());
+    }
+}
+
+#[test]
+fn failures_are_json_too_if_asked_for() {
+    let folder = TempDir::new().unwrap();
+    let failing: [&[&str]; 4] = [
+        &["replay", "none.png"],
+        &["evaluate", "none.ply", "none.ply"],
+        &["inspect", "--stage", "hull", "none.png"],
+        &["demo", "--out", "/dev/null/below"],
+    ];
+    for args in failing {
+        let output = run(folder.path(), &[args, &["--json"]].concat());
+        assert_eq!(output.status.code(), Some(1), "{args:?}");
+        let told = json(std::str::from_utf8(&output.stdout).unwrap());
+        let error = format!("error: {}\n", told["error"].as_str().unwrap());
+        assert_eq!(error, String::from_utf8(output.stderr).unwrap());
+        assert!(run(folder.path(), args).stdout.is_empty());
+    }
+}
+
+#[test]
+fn what_is_suspicious_about_a_file_is_told_with_its_refusal() {
+    let folder = TempDir::new().unwrap();
+    let dark = |name: &str| {
+        let image = image::open(torus(name)).unwrap().into_luma8();
+        let values = image.as_raw().iter().map(|&grey| u16::from(grey)).collect();
+        let deep = image::ImageBuffer::<image::Luma<u16>, Vec<u16>>::from_raw(320, 240, values).unwrap();
+        deep.save(folder.path().join(name)).unwrap();
+    };
+    ["left.png", "right.png"].into_iter().for_each(dark);
+    let error = bad(folder.path(), &["replay", "left.png", "right.png", "--calib", &torus("calib.yaml")], 1);
+    assert!(error.contains("left.png has 16 bits a pixel"), "{error}");
+}
+
+#[test]
 fn wrong_usage_is_2() {
     let folder = TempDir::new().unwrap();
-    let wrong: [&[&str]; 14] = [
+    let wrong: [&[&str]; 17] = [
         &["fly"],
         &["replay"],
         &["replay", "a", "b", "--omega", "4", "--mode", "paper"],
@@ -257,6 +306,9 @@ fn wrong_usage_is_2() {
         &["replay", "a", "b", "--jobs", "0"],
         &["replay", "a", "b", "--calib", "c", "--focal", "1", "--baseline", "1"],
         &["demo", "cube"],
+        &["render", "nothing", "--out", "x"],
+        &["render", "torus", "--focal", "0.5", "--out", "x"],
+        &["render", "torus", "--focal", "1e7", "--out", "x"],
         &["render", "torus"],
         &["render", "torus", "--out", "x", "--size", "640"],
         &["completions", "cmd"],
@@ -279,12 +331,13 @@ fn refusals_are_1_say_what_to_do_and_leave_nothing() {
     fs::write(path("huge.pgm"), "P5 60000 60000 255\n").unwrap();
     fs::write(path("file"), "").unwrap();
     fs::write(path("broken.obj"), "v 0 0 0\n").unwrap();
+    image::GrayImage::new(4097, 1).save(path("long.png")).unwrap();
     image::GrayImage::new(320, 241).save(path("tall.png")).unwrap();
     StereoCamera::rectified(640, 480, 750.0, 60.0).write_opencv_yaml(path("large.yaml")).unwrap();
     fs::write(path("nan.yaml"), fs::read_to_string(&calibration).unwrap().replacen("375.0", ".Nan", 1))
         .unwrap();
     let before = fs::read_dir(folder.path()).unwrap().count();
-    let refused: [(&[&str], &str); 17] = [
+    let refused: [(&[&str], &str); 22] = [
         (&["replay", "l.png", "r.png"], "give --calib FILE"),
         (&["replay", "l.png", "none.png"], "there is no file or folder"),
         (&["replay", "none.png"], "there is no file or folder none.png"),
@@ -296,11 +349,19 @@ fn refusals_are_1_say_what_to_do_and_leave_nothing() {
         (&["replay", &left, &right, "--calib", "nan.yaml"], "line 9"),
         (&["replay", &left, &right, "--calib", "none.yaml"], "cannot read the calibration none.yaml"),
         (&["replay", &left, &right, "--focal", "375", "--baseline", "60000"], "check the units"),
-        (&["replay", &right, &left], "left and right are swapped"),
+        (&["replay", &left, &right, "--focal", "0.5", "--baseline", "60"], "--focal must be 64 to 6400 px"),
+        (&["replay", &left, &right, "--focal", "1e7", "--baseline", "60"], "0.2 to 20 image widths"),
+        (&["replay", &right, &left], "give them in the other order"),
+        (&["replay", &left, &left], "both named left"),
+        (&["replay", "long.png", "r.png"], "long.png has a view of 4097x1 px"),
         (&["replay", "l.png", "--calib", &calibration], "give two"),
         (&["replay", &left, &right, "--out", "file/below"], "cannot write file/below"),
         (&["render", "broken.obj", "--out", "x"], "has no faces"),
         (&["render", "torus", "--place", "auto", "--distance", "10", "--out", "x"], "behind the left camera"),
+        (
+            &["render", "torus", "--place", "auto", "--distance", "1e6", "--out", "x"],
+            "nothing of the mesh is to be seen",
+        ),
         (&["evaluate", "none.ply", "broken.obj"], "cannot read none.ply"),
     ];
     for (args, told) in refused {

@@ -9,14 +9,18 @@ use std::thread;
 
 use rayon::{ThreadPoolBuildError, ThreadPoolBuilder};
 
-/// Does the jobs 0 to `count` on `threads` threads, by default one a core. Results in the order of the
-/// jobs.
+/// Threads a core that are of any use.
+const MOST_A_CORE: usize = 4;
+
+/// Does the jobs 0 to `count` on `threads` threads, by default one a core, at most [`MOST_A_CORE`] a core.
+/// Results in the order of the jobs.
 pub(super) fn run<T: Send>(
     count: usize,
     threads: Option<usize>,
     job: &(impl Fn(usize) -> T + Sync),
 ) -> Result<Vec<T>, ThreadPoolBuildError> {
-    let threads = threads.unwrap_or_else(rayon::current_num_threads).max(1);
+    let cores = thread::available_parallelism().map_or(1, usize::from);
+    let threads = threads.unwrap_or_else(rayon::current_num_threads).clamp(1, MOST_A_CORE * cores);
     let workers = threads.min(count).max(1);
     let pools = (0..workers).map(|worker| {
         let share = threads / workers + usize::from(worker < threads % workers);
@@ -53,7 +57,7 @@ mod tests {
 
     #[test]
     fn results_come_in_order_whatever_the_threads() {
-        for threads in [None, Some(1), Some(3), Some(8)] {
+        for threads in [None, Some(1), Some(3), Some(8), Some(65_535)] {
             let squares = run(5, threads, &|index| index * index).unwrap();
             assert_eq!(squares, [0, 1, 4, 9, 16]);
             assert_eq!(run(0, threads, &|index| index).unwrap(), [0usize; 0]);

@@ -39,7 +39,7 @@ pub struct Args {
     out: Option<PathBuf>,
     /// Print one JSON document instead of text
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 }
 
 /// Renders, reconstructs, compares.

@@ -33,7 +33,7 @@ pub struct Args {
     samples: u32,
     /// Print one JSON document instead of text
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 }
 
 /// Compares two meshes.

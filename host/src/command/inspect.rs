@@ -26,7 +26,8 @@
 mod alone;
 mod within;
 
-use super::note;
+use super::{Failure, note, say, say_json};
+use crate::output::write_together;
 use crate::report::pictures::eye::{self, Seen};
 use crate::report::record::{Parts, Rasters};
 use crate::report::words::{parse_polarity, parse_rule, parse_threshold};
@@ -34,19 +35,15 @@ use crate::source::picture::{self, Loaded};
 use crate::stage::balls::px;
 use clap::ValueEnum;
 use clap::error::ErrorKind;
-use image::{DynamicImage, GrayImage, RgbImage};
+use image::{DynamicImage, GrayImage, ImageFormat, RgbImage};
 use serde_json::{Map, Value, json};
 use shared::stage::binarise::{Polarity, Threshold};
 use shared::stage::distance::DISTANCE_PX;
 use shared::stage::medial::MedialBall;
 use shared::stage::thinning::Rule;
-use std::error::Error;
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::io::Cursor;
+use std::path::PathBuf;
 use std::time::Duration;
-
-/// Why nothing could be shown.
-type Failure = Box<dyn Error + Send + Sync>;
 
 /// What to inspect.
 #[derive(Clone, Debug, clap::Args)]
@@ -70,7 +67,7 @@ pub struct Args {
     repeat: u32,
     /// Print a JSON object with `median_us` instead of lines
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
     /// Draw the result, enlarged, as PNG
     #[arg(long, value_name = "PICTURE")]
     out: Option<PathBuf>,
@@ -125,28 +122,26 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let what = "--raw: this stage makes no raster; --json has its figures\n";
         return Err(clap::Error::raw(ErrorKind::ArgumentConflict, what).into());
     }
-    let Loaded { image, warning } = picture::load(&args.image)?;
-    if let Some(warning) = warning {
+    let Loaded { image, warnings } = picture::load_view(&args.image)?;
+    for warning in warnings {
         note(&format!("warning: {warning}"));
     }
     let made = make(args, &image)?;
+    let mut files = Vec::new();
     if let Some(path) = &args.out {
         let picture = draw(args.stage, &made).ok_or("there is nothing to draw: the mask is empty")?;
-        save(path, &picture.into())?;
+        files.push((path.as_path(), png(&picture.into())?));
     }
     if let Some(path) = &args.raw {
-        save(path, &raster(args.stage, &made))?;
+        files.push((path, png(&raster(args.stage, &made))?));
     }
+    write_together(&files)?;
     let figures = figures(args, &image, &made);
-    let text = if args.json {
-        format!("{:#}\n", Value::Object(figures))
-    } else {
-        figures.iter().map(|(name, value)| format!("{name:<24} {}\n", plain(value))).collect()
-    };
-    match std::io::stdout().lock().write_all(text.as_bytes()) {
-        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(error.into()),
-        _ => Ok(()),
+    if args.json {
+        return say_json(&Value::Object(figures));
     }
+    let lines = figures.iter().map(|(name, value)| format!("{name:<24} {}\n", plain(value)));
+    say(&lines.collect::<String>())
 }
 
 fn make(args: &Args, image: &GrayImage) -> Result<Made, Failure> {
@@ -184,10 +179,10 @@ fn raster(stage: Stage, made: &Made) -> DynamicImage {
     }
 }
 
-fn save(path: &Path, picture: &DynamicImage) -> Result<(), Failure> {
-    picture
-        .save_with_format(path, image::ImageFormat::Png)
-        .map_err(|error| format!("cannot write {}: {error}", path.display()).into())
+fn png(picture: &DynamicImage) -> Result<Vec<u8>, Failure> {
+    let mut bytes = Cursor::new(Vec::new());
+    picture.write_to(&mut bytes, ImageFormat::Png)?;
+    Ok(bytes.into_inner())
 }
 
 /// All that is printed.

@@ -81,11 +81,11 @@ impl Cli {
     pub fn run(&self) -> Result<(), Failure> {
         match &self.command {
             Command::Replay(args) => replay::run(args),
-            Command::Demo(args) => demo::run(args),
+            Command::Demo(args) => told(args.json, demo::run(args)),
             Command::Render(args) => render::run(args),
-            Command::Evaluate(args) => evaluate::run(args),
-            Command::Experiments(args) => experiments::run(args),
-            Command::Inspect(args) => inspect::run(args),
+            Command::Evaluate(args) => told(args.json, evaluate::run(args)),
+            Command::Experiments(args) => told(args.json, experiments::run(args)),
+            Command::Inspect(args) => told(args.json, inspect::run(args)),
             Command::Completions(args) => completions::run(args),
         }
     }
@@ -120,6 +120,18 @@ fn say(text: &str) -> Result<(), Failure> {
 /// Writes a JSON document to standard output.
 fn say_json(value: &serde_json::Value) -> Result<(), Failure> {
     say(&format!("{value:#}\n"))
+}
+
+/// Passes a result on; a failure is a JSON document too, if one was asked for.
+fn told<T>(json: bool, result: Result<T, Failure>) -> Result<T, Failure> {
+    if let Err(failure) = &result
+        && json
+        && !failure.is::<clap::Error>()
+    {
+        // The failure itself matters more than that it cannot be told here.
+        let _ = say_json(&serde_json::json!({ "error": words_of(&**failure) }));
+    }
+    result
 }
 
 /// Writes a line to standard error, if anybody listens.

@@ -14,6 +14,9 @@ use crate::reconstruct::{self, Options, Pieces, Profile, Radius, Skeleton};
 use crate::report::words::{parse_polarity, parse_rule, parse_threshold};
 use crate::source::Pair;
 
+/// Shortest and longest focal length that is believed, image widths: 136 and 3 degrees of view.
+const FOCALS: [f64; 2] = [0.2, 20.0];
+
 /// How the solid is found.
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "Method")]
@@ -131,6 +134,7 @@ impl CameraArgs {
     /// [`NoCalibration`], or what is wrong with the one there is.
     pub fn of(&self, pair: &Pair, left: &GrayImage) -> Result<(StereoCamera, Option<PathBuf>), Failure> {
         if let (Some(focal), Some(baseline)) = (self.focal, self.baseline) {
+            check_focal(focal, left.width())?;
             let camera = StereoCamera::rectified(left.width(), left.height(), focal, baseline);
             camera.check()?;
             return Ok((camera, None));
@@ -146,6 +150,18 @@ impl CameraArgs {
 /// Wrong usage that the parser cannot see.
 pub(super) fn usage(what: &str) -> Failure {
     Cli::command().error(ErrorKind::ArgumentConflict, what).into()
+}
+
+/// Whether a lens of this focal length, px, can be in front of an image of this width, px.
+pub(super) fn check_focal(focal: f64, width: u32) -> Result<(), String> {
+    let [low, high] = FOCALS.map(|share| share * f64::from(width));
+    if (low..=high).contains(&focal) {
+        return Ok(());
+    }
+    Err(format!(
+        "--focal must be {low:.0} to {high:.0} px, which is {} to {} image widths",
+        FOCALS[0], FOCALS[1]
+    ))
 }
 
 /// A positive number.

@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 use nalgebra::Point3;
 
-use super::options::positive;
+use super::options::{check_focal, positive, usage};
 use super::scene::{Scene, write};
 use super::table::{Table, sides};
 use super::{Failure, note, say};
@@ -27,7 +27,7 @@ use crate::calibration::StereoCamera;
 use crate::mesh::Mesh;
 use crate::mesh::read::read;
 use crate::render::Noise;
-use crate::shape::Shape;
+use crate::shape::{Shape, UnknownShape};
 use crate::view::{Calibrated, View};
 
 /// Least height of an object in the image that is worth trying, px.
@@ -91,7 +91,10 @@ enum Place {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let calibration = match &args.calib {
         Some(path) => StereoCamera::read(path)?,
-        None => StereoCamera::rectified(args.size[0], args.size[1], args.focal, args.baseline),
+        None => {
+            check_focal(args.focal, args.size[0]).map_err(|what| usage(&what))?;
+            StereoCamera::rectified(args.size[0], args.size[1], args.focal, args.baseline)
+        }
     };
     calibration.check()?;
     let views = Calibrated::pair(&calibration);
@@ -99,12 +102,13 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if args.place.unwrap_or(place) == Place::Auto {
         put_at(&mut mesh, &middle(&views, args.distance));
     }
-    for (view, eye) in views.iter().zip(["left", "right"]) {
-        if let Some(warning) = seen(&mesh, view, eye)? {
-            note(&format!("warning: {warning}"));
-        }
-    }
+    let warnings = views.iter().zip(["left", "right"]).map(|(view, eye)| seen(&mesh, view, eye));
+    let warnings = warnings.collect::<Result<Vec<_>, _>>()?;
     let mut scene = Scene::new(mesh, calibration);
+    check_shown(&scene)?;
+    for warning in warnings.into_iter().flatten() {
+        note(&format!("warning: {warning}"));
+    }
     for (eye, image) in (0..).zip(&mut scene.images) {
         let seed = args.seed.wrapping_mul(2).wrapping_add(eye);
         Noise { sigma: args.noise, salt_and_pepper: args.salt_and_pepper, seed }.apply(image);
@@ -122,7 +126,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 fn mesh(what: &str, scale: f64) -> Result<(Mesh, Place), Failure> {
     let path = Path::new(what);
     if path.extension().is_none() && !path.exists() {
-        let shape: Shape = what.parse()?;
+        let shape: Shape = what.parse().map_err(|unknown: UnknownShape| usage(&unknown.to_string()))?;
         return Ok((shape.mesh(shape.cell()), Place::AsIs));
     }
     let mut mesh = read(path)?;
@@ -185,6 +189,19 @@ fn seen(mesh: &Mesh, view: &Calibrated, eye: &str) -> Result<Option<String>, Fai
     } else {
         None
     })
+}
+
+/// Whether both images show anything: what is small enough falls between the rays.
+fn check_shown(scene: &Scene) -> Result<(), Failure> {
+    for (image, eye) in scene.images.iter().zip(["left", "right"]) {
+        if image.windows(2).all(|pixels| pixels[0] == pixels[1]) {
+            return Err(format!(
+                "nothing of the mesh is to be seen in the {eye} image; give --place auto, or another --distance or --scale"
+            )
+            .into());
+        }
+    }
+    Ok(())
 }
 
 fn size(text: &str) -> Result<[u32; 2], String> {

@@ -2,8 +2,8 @@
 //!
 //! INPUT is two files, LEFT RIGHT; or one image that holds both views; or a folder or pattern with many
 //! pairs, named left_0001 and right_0001, im0 and im1 (Middlebury), cam0/data and cam1/data (EuRoC), or
-//! lying in a folder each as left.png and right.png. Images may be PNG, JPEG, PGM, BMP or TIFF; colours
-//! become grey.
+//! lying in a folder each as left.png and right.png; case makes no difference. Images may be PNG, JPEG,
+//! PGM, BMP or TIFF; colours become grey, and what is transparent black.
 //!
 //! The pair's calibration is --calib, or else calib.yaml beside the images (or in a folder above them, up
 //! to the one named). Without any, give --focal and --baseline if the pair is rectified.
@@ -29,10 +29,10 @@ use serde_json::json;
 use super::model::{self, Model, Order};
 use super::options::{CameraArgs, MethodArgs};
 use super::table::Table;
-use super::{Failure, batch, note, say, say_json, words_of};
+use super::{Failure, batch, note, say, say_json, told, words_of};
 use crate::reconstruct::Options;
 use crate::source::find::{Found, find};
-use crate::source::{Files, Layout, Pair};
+use crate::source::{Files, Layout, Pair, Views};
 
 /// Arguments of `replay`.
 #[derive(Debug, clap::Args)]
@@ -50,7 +50,7 @@ pub struct Args {
     cameras: CameraArgs,
     #[command(flatten)]
     method: MethodArgs,
-    /// Threads [default: one a core]
+    /// Threads, at most four a core [default: one a core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     jobs: Option<u16>,
     /// Folder for the results
@@ -85,14 +85,25 @@ struct Success {
 /// If there is no pair, or any is refused.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let options = args.method.options()?;
-    let found = find(&args.input, args.layout)?;
-    let done = all(args, &options, &found)?;
+    let found = told(args.json, pairs(args))?;
+    let done = told(args.json, all(args, &options, &found))?;
     if args.json {
         say_json(&as_json(&done, &found))?;
     } else {
         say(&as_text(&done, &found))?;
     }
     summary(done, &found)
+}
+
+/// The pairs that are named.
+fn pairs(args: &Args) -> Result<Found, Failure> {
+    let found = find(&args.input, args.layout)?;
+    if found.single && !args.swap && found.pairs.iter().any(|pair| pair.files.are_named_in_reverse()) {
+        return Err("left and right are swapped: the first file is named right and the second left; give them in the \
+                    other order, and with --swap if their names are wrong"
+            .into());
+    }
+    Ok(found)
 }
 
 /// Every pair, in parallel; results in the order of the pairs.
@@ -123,17 +134,24 @@ fn one(args: &Args, options: &Options, pair: &Pair, folder: &Path) -> Result<Suc
     if args.swap {
         views.images.reverse();
     }
-    let (calibration, beside) = args.cameras.of(pair, &views.images[0])?;
-    let model = model::make(Order {
-        images: views.images,
-        calibration: &calibration,
-        options,
-        pictures: !args.no_pictures,
-        truth: None,
-        folder,
-    })?;
-    let warnings = views.warnings.into_iter().chain(model.warnings()).collect();
-    Ok(Success { model, warnings, calibration: beside })
+    let Views { images, warnings } = views;
+    let make = || {
+        let (calibration, beside) = args.cameras.of(pair, &images[0])?;
+        let pictures = !args.no_pictures;
+        let order = Order { images, calibration: &calibration, options, pictures, truth: None, folder };
+        Ok((model::make(order)?, beside))
+    };
+    let (model, calibration) = make().map_err(|failure| with_warnings(&warnings, failure))?;
+    let warnings = warnings.into_iter().chain(model.warnings()).collect();
+    Ok(Success { model, warnings, calibration })
+}
+
+/// A failure, with what was suspicious about the files.
+fn with_warnings(warnings: &[String], failure: Failure) -> Failure {
+    if warnings.is_empty() {
+        return failure;
+    }
+    format!("{}; {}", words_of(&*failure), warnings.join("; ")).into()
 }
 
 /// A failure, with a hint if the user may have forgotten the other image.

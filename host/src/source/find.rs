@@ -8,8 +8,8 @@
 //!
 //! How names say left and right is in `names.rs`. With a layout of one file a pair, every image is a pair.
 //!
-//! Pairs come in the order of their paths. Folders that hold a `report.json` below the one named are
-//! results, not input; hidden ones are passed over.
+//! Pairs come in the order of their paths. Results may lie among the input, even beside the pair that they
+//! come from: the pictures that a result holds are no input. Hidden folders are passed over.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsStr;
@@ -17,8 +17,9 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::names::{Partner, name, partner};
+use super::names::{Partner, eye, name, partner};
 use super::{Files, Layout, Pair};
+use crate::output::{PICTURES, is_result};
 
 /// Folders below the one named that are looked into.
 const MAX_DEPTH: usize = 5;
@@ -63,6 +64,19 @@ pub enum FindError {
         /// Images that are there.
         images: usize,
     },
+    /// Two files of one eye, as a shell makes them of a pattern.
+    #[error(
+        "{} and {} are both named {eye}; give LEFT RIGHT, or put a pattern in quotes so that the shell leaves it as it is",
+        first.display(), second.display()
+    )]
+    SameEye {
+        /// The file named first.
+        first: PathBuf,
+        /// The file named second.
+        second: PathBuf,
+        /// What both are named.
+        eye: &'static str,
+    },
     /// One file cannot be two.
     #[error("{} is one image, but --layout two needs two: give left and right", path.display())]
     OneOfTwo {
@@ -92,6 +106,7 @@ pub fn find(inputs: &[String], layout: Option<Layout>) -> Result<Found, FindErro
     let one_file = layout.is_some_and(|layout| layout != Layout::Two);
     let named = match files.as_slice() {
         [left, right] if left.is_file() && right.is_file() && !one_file => {
+            check_eyes(left, right)?;
             Some(Files::Two([left.clone(), right.clone()]))
         }
         [path] if path.is_file() && layout == Some(Layout::Two) => {
@@ -110,6 +125,18 @@ pub fn find(inputs: &[String], layout: Option<Layout>) -> Result<Found, FindErro
     search(inputs, layout.filter(|_| one_file))
 }
 
+/// Whether two files can be the two eyes of a pair, as far as their names say.
+fn check_eyes(first: &Path, second: &Path) -> Result<(), FindError> {
+    match (eye(first), eye(second)) {
+        (Some(one), Some(other)) if one == other => Err(FindError::SameEye {
+            first: first.into(),
+            second: second.into(),
+            eye: if one == 0 { "left" } else { "right" },
+        }),
+        _ => Ok(()),
+    }
+}
+
 /// An image, and the folder that the user named above it.
 type Candidate = (PathBuf, PathBuf);
 
@@ -125,6 +152,8 @@ fn search(inputs: &[String], layout: Option<Layout>) -> Result<Found, FindError>
             }
         }
     }
+    // Names that differ in case alone may claim one partner: who gets it must not depend on the file system.
+    candidates.sort();
     let mut found = BTreeMap::new();
     let mut alone = Vec::new();
     for (path, root) in &candidates {
@@ -168,11 +197,13 @@ fn expand(input: &str) -> Result<Vec<PathBuf>, FindError> {
 /// Adds the images in and below a folder.
 fn list(folder: &Path, root: &Path, depth: usize, into: &mut Vec<Candidate>) -> Result<(), FindError> {
     let unlisted = |source| FindError::Unlisted { path: folder.into(), source };
+    let is_result = is_result(folder);
     for entry in fs::read_dir(folder).map_err(unlisted)? {
         let path = entry.map_err(unlisted)?.path();
         let hidden = path.file_name().is_some_and(|name| name.as_encoded_bytes().starts_with(b"."));
         if path.is_dir() {
-            if depth < MAX_DEPTH && !hidden && !path.join("report.json").exists() {
+            let drawn = is_result && path.ends_with(PICTURES);
+            if depth < MAX_DEPTH && !hidden && !drawn {
                 list(&path, root, depth + 1, into)?;
             }
         } else if !hidden && is_image(&path) {
@@ -263,17 +294,54 @@ mod tests {
     }
 
     #[test]
-    fn results_and_hidden_folders_are_no_input() {
+    fn results_and_hidden_folders_are_no_input_but_the_pairs_beside_results_are() {
         let files = [
             "left.png",
             "right.png",
+            "model.ply",
+            "report.json",
+            "pictures/left.png",
+            "pictures/right.png",
+            "demo/left.png",
+            "demo/right.png",
+            "demo/model.ply",
+            "demo/report.json",
+            "demo/pictures/left_1.png",
+            "demo/pictures/right_1.png",
+            "out/model.ply",
             "out/report.json",
-            "out/left.png",
-            "out/right.png",
+            "out/pictures/1-mask.png",
             ".x/im0.png",
             ".x/im1.png",
         ];
-        assert_eq!(found(&files).0.len(), 1);
+        let (pairs, alone) = found(&files);
+        let lefts: Vec<_> = pairs.iter().map(|[_, left, _]| left.as_str()).collect();
+        assert_eq!((lefts, alone), (vec!["demo/left.png", "left.png"], 0));
+        assert_eq!(found(&["pictures/left.png", "pictures/right.png"]).0.len(), 1);
+    }
+
+    #[test]
+    fn case_makes_no_difference() {
+        let pairs = |files: &[&str]| found(files).0.concat().join(" ");
+        assert_eq!(pairs(&["a/left.png", "a/Right.png"]), "a a/left.png a/Right.png");
+        assert_eq!(pairs(&["LEFT_1.JPG", "right_1.jpg"]), "1 LEFT_1.JPG right_1.jpg");
+        assert_eq!(pairs(&["Left/1.png", "right/1.PNG"]), "1 Left/1.png right/1.PNG");
+        assert_eq!(pairs(&["left.png", "Right.png", "right.png"]).matches("left.png right.png").count(), 1);
+    }
+
+    #[test]
+    fn two_files_of_one_eye_are_no_pair() {
+        let folder =
+            folder(&["a/left.png", "b/left.png", "cam0/data/1.png", "cam0/data/2.png", "cam1/data/1.png"]);
+        let told = |files: [&str; 2]| {
+            let inputs = files.map(|file| folder.path().join(file).display().to_string());
+            find(&inputs, None).map_err(|error| error.to_string())
+        };
+        let error = told(["a/left.png", "b/left.png"]).unwrap_err();
+        assert!(error.contains("both named left") && error.contains("quotes"), "{error}");
+        assert!(told(["a/left.png", "cam0/data/1.png"]).is_err());
+        assert!(told(["a/left.png", "cam1/data/1.png"]).is_ok());
+        assert!(told(["a/left.png", "cam0/data/2.png"]).is_ok());
     }
 
     #[test]

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use image::GrayImage;
 
-use picture::{Loaded, PictureError, load};
+use picture::{Loaded, PictureError, check_side, load, load_view};
 
 /// How the views of a pair lie in files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -43,6 +43,17 @@ pub enum Files {
     One(PathBuf, Option<Layout>),
 }
 
+impl Files {
+    /// Whether the names say right, then left.
+    #[must_use]
+    pub fn are_named_in_reverse(&self) -> bool {
+        match self {
+            Self::Two(files) => files.each_ref().map(|file| names::eye(file)) == [Some(1), Some(0)],
+            Self::One(..) => false,
+        }
+    }
+}
+
 /// A pair to be reconstructed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pair {
@@ -72,8 +83,8 @@ impl Pair {
     pub fn load(&self) -> Result<Views, PictureError> {
         match &self.files {
             Files::Two([left, right]) => {
-                let (left, right) = (load(left)?, load(right)?);
-                let warnings = left.warning.into_iter().chain(right.warning).collect();
+                let (left, right) = (load_view(left)?, load_view(right)?);
+                let warnings = [left.warnings, right.warnings].concat();
                 Ok(Views { images: [left.image, right.image], warnings })
             }
             Files::One(path, layout) => split(path, load(path)?, *layout),
@@ -83,7 +94,7 @@ impl Pair {
 
 /// Cuts an image with both views in two.
 fn split(path: &Path, whole: Loaded, layout: Option<Layout>) -> Result<Views, PictureError> {
-    let Loaded { image, warning } = whole;
+    let Loaded { image, warnings } = whole;
     let (width, height) = image.dimensions();
     let side_by_side = layout.unwrap_or_else(|| Layout::guess(width, height)) == Layout::SideBySide;
     let length = if side_by_side { width } else { height };
@@ -96,7 +107,9 @@ fn split(path: &Path, whole: Loaded, layout: Option<Layout>) -> Result<Views, Pi
             if side_by_side { (second * half, 0, half, height) } else { (0, second * half, width, half) };
         image::imageops::crop_imm(&image, x, y, w, h).to_image()
     };
-    Ok(Views { images: [part(0), part(1)], warnings: warning.into_iter().collect() })
+    let images = [part(0), part(1)];
+    check_side(path, &images[0])?;
+    Ok(Views { images, warnings })
 }
 
 #[cfg(test)]
@@ -115,12 +128,31 @@ mod tests {
     #[test]
     fn cuts_in_the_middle() {
         let image = GrayImage::from_fn(6, 2, |u, v| Luma([(10 * v + u) as u8]));
-        let whole = || Loaded { image: image.clone(), warning: None };
+        let whole = || Loaded { image: image.clone(), warnings: Vec::new() };
         let views = split(Path::new("a"), whole(), Some(Layout::SideBySide)).unwrap();
         assert_eq!(views.images[1].as_raw(), &[3, 4, 5, 13, 14, 15]);
         let views = split(Path::new("a"), whole(), Some(Layout::TopBottom)).unwrap();
         assert_eq!(views.images[1].as_raw(), &[10, 11, 12, 13, 14, 15]);
-        let odd = Loaded { image: GrayImage::new(5, 2), warning: None };
+        let odd = Loaded { image: GrayImage::new(5, 2), warnings: Vec::new() };
         assert!(split(Path::new("a"), odd, Some(Layout::SideBySide)).is_err());
+    }
+
+    #[test]
+    fn a_half_may_be_as_long_as_a_view() {
+        let side = shared::limits::MAX_SIDE as u32;
+        let halves = |side: u32| {
+            let whole = Loaded { image: GrayImage::new(2 * side, 1), warnings: Vec::new() };
+            split(Path::new("a"), whole, Some(Layout::SideBySide))
+        };
+        assert!(halves(side).is_ok());
+        assert!(matches!(halves(side + 1), Err(PictureError::TooLong { .. })));
+    }
+
+    #[test]
+    fn order_is_told_by_names() {
+        let reverse =
+            |left: &str, right: &str| Files::Two([left.into(), right.into()]).are_named_in_reverse();
+        assert!(reverse("a/right.png", "a/left.png") && reverse("im1.png", "im0.png"));
+        assert!(!reverse("a/left.png", "a/right.png") && !reverse("a.png", "b.png"));
     }
 }

@@ -2,9 +2,10 @@
 //!
 //! A name says left or right by `left`/`right` (`left_0007`, `0007_left`, `left07`), by `im0`/`im1`
 //! (Middlebury), or by its folder: `left`/`right`, or `cam0/data`/`cam1/data` (EuRoC, where names are time
-//! stamps and partners have the same one).
+//! stamps and partners have the same one). Upper and lower case are the same.
 
 use std::ffi::OsStr;
+use std::fs;
 use std::path::{Component, Path, PathBuf};
 
 /// Words for the two eyes.
@@ -33,12 +34,37 @@ pub(super) fn partner(path: &Path) -> Partner {
     let mut any = false;
     for (eye, other) in candidates.into_iter().flatten() {
         any = true;
-        if other.is_file() {
+        if let Some(other) = in_any_case(&other).filter(|other| other.is_file()) {
             let pair = if eye == 0 { [path.into(), other] } else { [other, path.into()] };
             return Partner::Pair(pair);
         }
     }
     if any { Partner::Missing } else { Partner::None }
+}
+
+/// The eye that a file is named after; its folder's name counts if there is a partner in the other eye's.
+pub(super) fn eye(path: &Path) -> Option<usize> {
+    let by_folder = || match partner(path) {
+        Partner::Pair([left, _]) => Some(usize::from(left != path)),
+        Partner::None | Partner::Missing => None,
+    };
+    mirrored_file(path).map(|(eye, _)| eye).or_else(by_folder)
+}
+
+/// What exists by this path, or by one that differs from it in case alone.
+fn in_any_case(path: &Path) -> Option<PathBuf> {
+    if path.exists() {
+        return Some(path.into());
+    }
+    let name = path.file_name()?;
+    let folder = match path.parent()? {
+        folder if folder.as_os_str().is_empty() => Path::new(".").into(),
+        folder => in_any_case(folder)?,
+    };
+    let names = fs::read_dir(&folder).ok()?.filter_map(|entry| Some(entry.ok()?.file_name()));
+    // The first in order: listings have none.
+    let found = names.filter(|other| other.eq_ignore_ascii_case(name)).min()?;
+    Some(if path.parent() == Some(Path::new("")) { found.into() } else { folder.join(found) })
 }
 
 /// Which eye a file's name says it is, and the path of the other eye's file.
@@ -63,27 +89,39 @@ fn mirrored_folder(path: &Path) -> Option<(usize, PathBuf)> {
 /// The eye that a name speaks of, and what stands before and after the word.
 fn eye_in(name: &str) -> Option<(usize, &str, &str)> {
     EYES.iter().flat_map(|words| words.iter().enumerate()).find_map(|(eye, word)| {
-        if name == *word {
+        if name.eq_ignore_ascii_case(word) {
             return Some((eye, "", ""));
         }
         // `left01`, `left_scene`, `scene_left`: apart from other letters, and `im0` from other digits.
         let apart = |c: Option<char>| c.is_none_or(|c| matches!(c, '_' | '-' | '.' | ' '));
         let ends_in_digit = word.ends_with(|c: char| c.is_ascii_digit());
-        if let Some(after) = name.strip_prefix(word)
+        if let Some(after) = without_head(name, word)
             && (apart(after.chars().next())
                 || !ends_in_digit && after.bytes().all(|byte| byte.is_ascii_digit()))
         {
             return Some((eye, "", after));
         }
-        let before = name.strip_suffix(word)?;
+        let before = without_tail(name, word)?;
         apart(before.chars().next_back()).then_some((eye, before, ""))
     })
 }
 
+/// What follows a word at the start of a name.
+fn without_head<'a>(name: &'a str, word: &str) -> Option<&'a str> {
+    let (head, rest) = name.split_at_checked(word.len())?;
+    head.eq_ignore_ascii_case(word).then_some(rest)
+}
+
+/// What comes before a word at the end of a name.
+fn without_tail<'a>(name: &'a str, word: &str) -> Option<&'a str> {
+    let (rest, tail) = name.split_at_checked(name.len().checked_sub(word.len())?)?;
+    tail.eq_ignore_ascii_case(word).then_some(rest)
+}
+
 fn opposite(word: &str) -> Option<&'static str> {
     EYES.iter().find_map(|[left, right]| match word {
-        _ if word == *left => Some(*right),
-        _ if word == *right => Some(*left),
+        _ if word.eq_ignore_ascii_case(left) => Some(*right),
+        _ if word.eq_ignore_ascii_case(right) => Some(*left),
         _ => None,
     })
 }
@@ -123,6 +161,9 @@ mod tests {
             ("right_0007", Some((1, "", "_0007"))),
             ("right07", Some((1, "", "07"))),
             ("cup-left", Some((0, "cup-", ""))),
+            ("Cup_RIGHT", Some((1, "Cup_", ""))),
+            ("Left07", Some((0, "", "07"))),
+            ("é", None),
             ("im1", Some((1, "", ""))),
             ("im10", None),
             ("leftover", None),

@@ -1,7 +1,8 @@
 //! One image file to grey values.
 //!
 //! In: PNG, JPEG, PGM/PPM, BMP or TIFF, told apart by content. Out: 8-bit grey values: colours become luma
-//! (BT.709), 16-bit values are scaled. Sizes are held against a limit before any pixel gets memory.
+//! (BT.709), 16-bit values are scaled, and what is transparent lies on black, as the background is unless the
+//! user says otherwise. Sizes are held against a limit before any pixel gets memory.
 //!
 //! Decoders of JPEG go on where bytes are damaged, and half a silhouette looks like an object. So a JPEG is
 //! first read strictly; one that fails is refused if it ends too early, and flagged otherwise.
@@ -10,7 +11,7 @@ use std::fs;
 use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
 
-use image::{GrayImage, ImageError, ImageFormat, ImageReader, Limits};
+use image::{DynamicImage, GrayImage, ImageError, ImageFormat, ImageReader, Limits, Luma};
 use shared::limits::MAX_SIDE;
 use zune_jpeg::zune_core::bytestream::ZCursor;
 use zune_jpeg::zune_core::options::DecoderOptions;
@@ -63,6 +64,19 @@ pub enum PictureError {
         /// The file.
         path: PathBuf,
     },
+    /// A view is larger than the method works on.
+    #[error(
+        "{} has a view of {width}x{height} px, but at most {MAX_SIDE} px a side are worked on; reduce the image, and \
+         the focal lengths and principal points of its calibration by the same factor", path.display()
+    )]
+    TooLong {
+        /// The file.
+        path: PathBuf,
+        /// Width of the view, px.
+        width: u32,
+        /// Height of the view, px.
+        height: u32,
+    },
     /// Both views in one image, but its halves differ.
     #[error(
         "{} has {length} rows or columns, which cannot be halved; check --layout", path.display()
@@ -80,11 +94,31 @@ pub enum PictureError {
 pub struct Loaded {
     /// Grey values.
     pub image: GrayImage,
-    /// A sentence for the user.
-    pub warning: Option<String>,
+    /// Sentences for the user.
+    pub warnings: Vec<String>,
 }
 
-/// Reads the image in the file `path`.
+/// Reads the image of one view in the file `path`.
+///
+/// # Errors
+///
+/// See [`PictureError`].
+pub fn load_view(path: &Path) -> Result<Loaded, PictureError> {
+    let loaded = load(path)?;
+    check_side(path, &loaded.image)?;
+    Ok(loaded)
+}
+
+/// Whether a view is small enough to be worked on.
+pub(super) fn check_side(path: &Path, view: &GrayImage) -> Result<(), PictureError> {
+    let (width, height) = view.dimensions();
+    if width.max(height) as usize > MAX_SIDE {
+        return Err(PictureError::TooLong { path: path.into(), width, height });
+    }
+    Ok(())
+}
+
+/// Reads the image in the file `path`, which may hold both views.
 ///
 /// # Errors
 ///
@@ -101,10 +135,21 @@ pub fn load(path: &Path) -> Result<Loaded, PictureError> {
         Some(ImageFormat::Jpeg) => jpeg_damage(path, &bytes)?,
         Some(_) => None,
     };
-    decode(path, reader).map(|image| Loaded { image, warning })
+    let picture = decode(path, reader)?;
+    let mut warnings: Vec<String> = warning.into_iter().chain(dark(path, &picture)).collect();
+    let image = if picture.color().has_alpha() {
+        let (image, transparent) = on_black(&picture);
+        warnings.extend(transparent.then(|| {
+            format!("{} is transparent in places, which are taken for black; save it without", path.display())
+        }));
+        image
+    } else {
+        picture.into_luma8()
+    };
+    Ok(Loaded { image, warnings })
 }
 
-fn decode(path: &Path, mut reader: ImageReader<Cursor<&[u8]>>) -> Result<GrayImage, PictureError> {
+fn decode(path: &Path, mut reader: ImageReader<Cursor<&[u8]>>) -> Result<DynamicImage, PictureError> {
     let mut limits = Limits::default();
     limits.max_image_width = Some(MAX_PX);
     limits.max_image_height = Some(MAX_PX);
@@ -112,11 +157,39 @@ fn decode(path: &Path, mut reader: ImageReader<Cursor<&[u8]>>) -> Result<GrayIma
     reader.limits(limits);
     let path = path.to_path_buf();
     match reader.decode() {
-        Ok(image) => Ok(image.into_luma8()),
+        Ok(image) => Ok(image),
         Err(ImageError::Limits(_)) => Err(PictureError::TooLarge { path }),
         Err(ImageError::Unsupported(_)) => Err(PictureError::Unknown { path }),
         Err(source) => Err(PictureError::Damaged { path, source }),
     }
+}
+
+/// Grey values on a black ground, and whether any of it is seen through the image.
+fn on_black(picture: &DynamicImage) -> (GrayImage, bool) {
+    let picture = picture.to_luma_alpha8();
+    let image = GrayImage::from_fn(picture.width(), picture.height(), |u, v| {
+        let [grey, alpha] = picture[(u, v)].0.map(u16::from);
+        Luma([((grey * alpha + 127) / 255) as u8])
+    });
+    (image, picture.pixels().any(|pixel| pixel.0[1] < u8::MAX))
+}
+
+/// A warning if 16 bits hold the values of 8.
+fn dark(path: &Path, picture: &DynamicImage) -> Option<String> {
+    let deep = matches!(
+        picture,
+        DynamicImage::ImageLuma16(_)
+            | DynamicImage::ImageLumaA16(_)
+            | DynamicImage::ImageRgb16(_)
+            | DynamicImage::ImageRgba16(_)
+    );
+    let brightest = if deep { picture.to_luma16().iter().copied().max()? } else { 0 };
+    (1..256).contains(&brightest).then(|| {
+        format!(
+            "{} has 16 bits a pixel but no value above {brightest}, so that it is black; save its values in 8 bits",
+            path.display()
+        )
+    })
 }
 
 /// A warning if a strict decoder stumbles over the file.
@@ -141,7 +214,7 @@ fn jpeg_damage(path: &Path, bytes: &[u8]) -> Result<Option<String>, PictureError
 #[cfg(test)]
 mod tests {
     use super::*;
-    use image::{DynamicImage, ImageBuffer, Luma};
+    use image::{ImageBuffer, Rgba, RgbaImage};
 
     fn bytes_of(image: &DynamicImage, format: ImageFormat) -> Vec<u8> {
         let mut bytes = Cursor::new(Vec::new());
@@ -166,13 +239,38 @@ mod tests {
         let deep: ImageBuffer<Luma<u16>, Vec<u16>> = ImageBuffer::from_pixel(4, 3, Luma([0x80_80]));
         let loaded = told("deep.png", &bytes_of(&deep.into(), ImageFormat::Png)).unwrap();
         assert_eq!(loaded.image, GrayImage::from_pixel(4, 3, Luma([0x80])));
+        assert!(loaded.warnings.is_empty());
+        let dark: ImageBuffer<Luma<u16>, Vec<u16>> = ImageBuffer::from_pixel(4, 3, Luma([200]));
+        let loaded = told("dark.png", &bytes_of(&dark.into(), ImageFormat::Png)).unwrap();
+        assert!(loaded.warnings[0].contains("no value above 200"), "{:?}", loaded.warnings);
+    }
+
+    #[test]
+    fn what_is_transparent_lies_on_black() {
+        let mut cut_out = RgbaImage::from_pixel(2, 1, Rgba([255, 255, 255, 0]));
+        cut_out.put_pixel(1, 0, Rgba([200, 200, 200, 255]));
+        let loaded = told("cut-out.png", &bytes_of(&cut_out.into(), ImageFormat::Png)).unwrap();
+        assert_eq!(loaded.image.as_raw(), &[0, 200]);
+        assert!(loaded.warnings[0].contains("transparent"), "{:?}", loaded.warnings);
+        let opaque = RgbaImage::from_pixel(2, 1, Rgba([90, 90, 90, 255]));
+        let loaded = told("opaque.png", &bytes_of(&opaque.into(), ImageFormat::Png)).unwrap();
+        assert_eq!((loaded.image.as_raw().as_slice(), loaded.warnings.len()), (&[90, 90][..], 0));
+    }
+
+    #[test]
+    fn a_view_that_is_too_long_says_so() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("long.png");
+        GrayImage::new(MAX_SIDE as u32 + 1, 2).save(&path).unwrap();
+        let error = load_view(&path).unwrap_err().to_string();
+        assert!(error.contains("4097x2 px") && error.contains("reduce the image"), "{error}");
     }
 
     #[test]
     fn a_file_cut_short_is_refused_at_any_length() {
         for format in [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::Pnm, ImageFormat::Bmp] {
             let whole = bytes_of(&disc(), format);
-            assert!(told("whole", &whole).is_ok_and(|loaded| loaded.warning.is_none()), "{format:?}");
+            assert!(told("whole", &whole).is_ok_and(|loaded| loaded.warnings.is_empty()), "{format:?}");
             for part in [1, 10, 50, 90, 99] {
                 let cut = &whole[..whole.len() * part / 100];
                 assert!(told("cut", cut).is_err(), "{format:?} at {part} %");
@@ -187,7 +285,7 @@ mod tests {
         // A marker in the middle of the scan.
         bytes[middle..middle + 2].copy_from_slice(&[0xff, 0xc4]);
         match told("damaged.jpg", &bytes) {
-            Ok(loaded) => assert!(loaded.warning.is_some_and(|text| text.contains("damaged JPEG"))),
+            Ok(loaded) => assert!(loaded.warnings[0].contains("damaged JPEG")),
             Err(error) => assert!(matches!(error, PictureError::Damaged { .. }), "{error}"),
         }
     }

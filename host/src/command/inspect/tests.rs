@@ -89,6 +89,16 @@ fn files_come_out_as_they_are() {
     assert!(matches!(image::open(path("raw.png")).unwrap(), DynamicImage::ImageLuma16(_)));
     run(&args(&["--stage", "binarise", "--raw", &path("mask.png"), &path("key.png")])).unwrap();
     assert_eq!(image::open(path("mask.png")).unwrap().to_luma8(), key());
+    let error = run(&args(&[
+        "--stage",
+        "binarise",
+        "--out",
+        &path("a.png"),
+        "--raw",
+        &path("none/b.png"),
+        &path("key.png"),
+    ]));
+    assert!(error.unwrap_err().to_string().contains("b.png") && !folder.path().join("a.png").exists());
     let error = run(&args(&["--stage", "hull", "--raw", &path("no.png"), &path("key.png")])).unwrap_err();
     assert!(error.downcast_ref::<clap::Error>().is_some());
 }
