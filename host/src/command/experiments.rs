@@ -31,7 +31,7 @@ pub struct Args {
     quick: bool,
     /// Print one JSON document instead of text
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 }
 
 /// Runs all experiments.
