@@ -1,8 +1,8 @@
 //! The visual hull of two silhouettes (Laurentini 1994): all that both cones of rays share.
 //!
-//! Two eyes side by side leave it open along the rays: an object wider than its disparity is explained by
-//! points at any distance. So it is cut at the depths at which the left silhouette, moved by that depth's
-//! disparity, still covers three quarters of the smaller of the two: any more generous cut makes it worse.
+//! Two eyes side by side leave it open along the rays: it reaches many times its width into depth. So it
+//! gets the same chance as a person's guess: it is cut to be no deeper than the lesser of its width and
+//! height, about the depth of the silhouettes' centroids.
 
 use nalgebra::Point3;
 
@@ -11,8 +11,6 @@ use crate::mesh::Mesh;
 use crate::shape::isosurface::isosurface;
 use crate::stage::rectify::RectifiedCamera;
 
-/// Part of the smaller silhouette that both must share for a depth to be possible.
-const SHARED: f64 = 0.75;
 /// Brings the slope of the field below 1: linear interpolation between pixels and slanting rays make it
 /// steeper than the distance in the image.
 const SLOPE: f64 = 0.5;
@@ -36,17 +34,10 @@ pub fn visual_hull(outlines: [&Outline; 2], camera: &RectifiedCamera, cell: f64)
     isosurface(&field, [low, high], cell)
 }
 
-/// The nearest and the farthest possible depth, mm.
+/// The nearest and the farthest depth that the hull is cut at, mm.
 fn depths([left, right]: [&Outline; 2], camera: &RectifiedCamera) -> Option<[f64; 2]> {
-    let pixels: Vec<_> = left.pixels().collect();
-    let least = pixels.len().min(right.pixels().count()) as f64 * SHARED;
-    let widest = left.bounds()[1].x - right.bounds()[0].x;
-    let offset = camera.disparity_offset();
-    let possible = |d: &f64| {
-        let shift = nalgebra::Vector2::new(*d, 0.0);
-        pixels.iter().filter(|p| right.at(&(*p - shift)) < 0.0).count() as f64 >= least
-    };
-    let first = (1.0 - offset).ceil() as i64;
-    let disparities: Vec<f64> = (first..=widest.ceil() as i64).map(|d| d as f64).filter(possible).collect();
-    Some([camera.depth(*disparities.last()?)?, camera.depth(*disparities.first()?)?])
+    let [low, high] = left.bounds();
+    let depth = camera.depth(left.centroid().x - right.centroid().x)?;
+    let half = (high - low).min() / 2.0 * depth / camera.f;
+    Some([(depth - half).max(depth / 2.0), depth + half])
 }

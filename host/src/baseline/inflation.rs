@@ -1,23 +1,24 @@
-//! One silhouette inflated: the distance transform taken for half the thickness.
+//! One silhouette inflated: every disc inside it becomes a ball, all at one depth.
 //!
 //! About the plane at the object's mean depth Z, a point of the left image at distance D (px) inside the
-//! outline is D Z / f thick to either side:
+//! outline carries a ball of radius D Z / f; the solid is their union:
 //!
 //! ```text
-//! |z - Z| <= D(u, v) Z / f,      Z = f B / d,   d the disparity of the silhouettes' centroids
+//! half thickness^2 (q) = max over p of (D(p)^2 - |q - p|^2) (Z / f)^2,
+//! Z = f B / d,   d the disparity of the silhouettes' centroids
 //! ```
 //!
-//! A disc becomes a double cone, a strip of even width a roof; depth does not vary along the object.
+//! A disc becomes a ball, a strip of even width a cylinder; depth does not vary along the object. It is what
+//! is left of the method when the second view gives one number.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 
 use super::Outline;
 use crate::mesh::Mesh;
-use crate::shape::isosurface::isosurface;
+use crate::mesh::body::keep_largest_body;
 use crate::stage::rectify::RectifiedCamera;
-
-/// Brings the slope of the field below 1: depth and thickness both change along a slanting line.
-const SLOPE: f64 = 0.4;
+use crate::stage::solid::{SolidBall, outermost, spheres};
+use crate::stage::surface::surface;
 
 /// The left outline inflated, in cells of `cell` mm; empty if the centroids lie behind the cameras.
 #[must_use]
@@ -25,15 +26,13 @@ pub fn inflation([left, right]: [&Outline; 2], camera: &RectifiedCamera, cell: f
     let disparity = left.centroid().x - right.centroid().x;
     let Some(depth) = camera.depth(disparity) else { return Mesh::default() };
     let pixel = depth / camera.f;
-    let thickest = left.pixels().map(|p| -left.at(&p)).fold(0.0, f64::max) * pixel + cell;
-    let field = |p: &Point3<f64>| {
-        let outside = camera.project(p).map_or(thickest, |[at, _]| left.at(&at) * pixel);
-        SLOPE * (outside + (p.z - depth).abs())
+    let ball = |(place, at): (usize, nalgebra::Point2<f64>)| SolidBall {
+        centre: Point3::from(camera.ray(at.x, at.y) * depth),
+        radius: -left.at(&at) * pixel,
+        at: at.coords,
+        place,
     };
-    let ends = [depth - thickest, depth + thickest];
-    let corners =
-        ends.into_iter().flat_map(|z| left.bounds().map(|p| Point3::from(camera.ray(p.x, p.y) * z)));
-    let infinity = Point3::from(Vector3::repeat(f64::INFINITY));
-    let (low, high) = corners.fold((infinity, -infinity), |(l, h), p| (l.inf(&p), h.sup(&p)));
-    isosurface(&field, [low, high], cell)
+    let balls: Vec<SolidBall> = left.pixels().enumerate().map(ball).filter(|b| b.radius > 0.0).collect();
+    let inflated = surface(&spheres(&outermost(&balls, pixel)), cell);
+    inflated.map(|mesh| keep_largest_body(&mesh).mesh).unwrap_or_default()
 }

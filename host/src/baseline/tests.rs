@@ -66,24 +66,24 @@ fn the_hull_of_a_ball_holds_it_and_has_its_silhouettes() {
         assert!(outlines.iter().zip(seen).all(|(outline, at)| outline.at(&at) < 0.1));
     }
     let [low, high] = hull.bounds().expect("not empty");
-    assert!(low.z < 390.0 && high.z > 510.0, "{} to {}", low.z, high.z);
-    assert!(found.volume_ratio.expect("closed") > 1.5);
+    // The outline lies r^2 / Z = 8 mm in front of the centre, and with it the cut.
+    assert!(low.z < 392.0 && high.z > 500.0, "{} to {}", low.z, high.z);
+    assert!(found.volume_ratio.expect("closed") > 1.2);
 }
 
-/// A disc of radius R inflated is a double cone of volume 2/3 pi R^3, half of the ball's.
+/// A disc inflated is a ball: seen a hundredth larger than it is, and less the twentieth of a pixel and the
+/// cells of 2 mm in which it is made.
 #[test]
-fn an_inflated_disc_is_a_double_cone() {
+fn an_inflated_disc_is_a_ball() {
     let outlines = ball();
-    let cone = inflation([&outlines[0], &outlines[1]], &camera(), 2.0);
+    let inflated = inflation([&outlines[0], &outlines[1]], &camera(), 2.0);
     let found = evaluate(
-        &cone,
+        &inflated,
         &Shape::Sphere.mesh(3.0),
         &Pinhole::pair(),
         &Options { samples: 500, ..Options::default() },
     );
     assert_eq!((found.closed, found.bodies), (true, 1));
     let ratio = found.volume_ratio.expect("closed");
-    assert!((ratio - 0.5).abs() < 0.03, "{ratio}");
-    let [low, high] = cone.bounds().expect("not empty");
-    assert!((high.z - low.z - 120.0).abs() < 4.0, "{}", high.z - low.z);
+    assert!((0.95..1.05).contains(&ratio), "{ratio}");
 }

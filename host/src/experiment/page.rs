@@ -134,7 +134,7 @@ fn all_shapes(page: &mut String, found: &Experiments) {
     say(
         page,
         &format!(
-            "The default is nearer to the truth than both baselines for {count} of {} pairs. The visual hull of two eyes side by side stays open in depth and is cut where three quarters of the silhouettes still overlap; inflation has one depth for all of the object.",
+            "The default is nearer to the truth than both baselines for {count} of {} pairs. The visual hull of two eyes side by side stays open in depth and is cut to be no deeper than it is wide and high; inflation has one depth for all of the object.",
             found.shapes.len()
         ),
     );
