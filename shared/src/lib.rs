@@ -9,6 +9,7 @@ pub mod point;
 pub mod bitmap;
 pub mod pattern;
 pub mod envelope;
+pub mod camera;
 
 // What happens to a picture.
 pub mod stage;
