@@ -2,6 +2,7 @@
 
 pub mod core;
 pub mod graph;
+pub mod link;
 pub mod matching;
 pub mod mesh_checker;
 pub mod nurbs;
