@@ -8,7 +8,7 @@
 //! | between | knots: four down and then four along, by the rule below; raw pixels: four, linearly |
 //! | outside | the raw picture repeats its border |
 //! | bounds | places are cut to +-4096 px = 2^20 / 256; every sum is below 2^31 |
-//! | cost | a row: 2 x 4 products a knot; a pixel: 2 x 3 products for its place and 6 for its value |
+//! | cost | a row: 2 x 4 products a knot; a pixel: 2 x 4 products for its place and 6 for its value |
 //!
 //! Bessel's rule to second differences: with D = p0 - p1 - p2 + p3, a share t of the way from p1 to p2 lies
 //! at p1 + t (p2 - p1) - t (1 - t) D / 4. It is exact for parabolas and off by at most 0.008 STEP^3 times
