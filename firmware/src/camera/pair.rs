@@ -1,6 +1,6 @@
 //! Two modules as one pair of eyes.
 //!
-//! Each step is taken by both eyes before the next, so that waiting is shared and a shared control bus works.
+//! Each step is taken by both eyes before the next, so that a shared control bus works and waiting is shared.
 //! Both captures are started back to back, but each sensor runs on its own: each eye keeps its next whole
 //! frame, and the skew between both is up to one frame. It is measured, not mended.
 
@@ -98,8 +98,12 @@ impl<S: SpiDevice, I: I2c, D: DelayNs, C: Clock> Pair<S, I, D, C> {
         both(modules, |m| m.chip.set_up())?;
         // Another sensor is not written to.
         both(modules, |m| m.sensor.identify())?;
-        both(modules, |m| m.sensor.reset())?;
-        delay.delay_ms(ov2640::RESET_MS);
+        both(modules, |m| {
+            m.sensor.reset()?;
+            // At once: on a shared bus this reset both, and the other one's order must be heard.
+            delay.delay_ms(ov2640::RESET_MS);
+            Ok(())
+        })?;
         both(modules, |m| m.sensor.set_up())?;
         both(modules, |m| m.sensor.expose(exposure))?;
         self.test()?;
