@@ -275,9 +275,6 @@ impl Sensor {
             Err(bytes) => return (0..bytes).map(|i| (i * i / 8) as u8).collect(),
         };
         let pixel = |u: usize, v: usize| -> [u8; 3] {
-            if self.sensor(0x12) & 0x02 != 0 {
-                return BARS[u * BARS.len() / format.width];
-            }
             let place = |at: usize, of: usize, [first, count, all]: [usize; 3], side: usize| {
                 (first * of + at * count) * side / (of * all)
             };
@@ -292,6 +289,11 @@ impl Sensor {
             }
             let light = u64::from(self.scene[row * SIZE.0 + column]) * self.sensitivity();
             let luma = ((light + 2400) / 4800).min(255) as u8;
+            if self.sensor(0x12) & 0x02 != 0 {
+                // Bars over the scene, at worst.
+                let [bar, cb, cr] = BARS[u * BARS.len() / format.width];
+                return [bar.saturating_add(luma), cb, cr];
+            }
             [luma, (90 + u % 60) as u8, (140 + v % 60) as u8]
         };
         // A change is seen in the frame after the next: until then the upper half is an older one.
