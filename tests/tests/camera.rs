@@ -404,6 +404,9 @@ fn the_model_refuses_what_the_chips_would_get_wrong() {
         spi(b, &[0x41]);
         b.picture_bus(0).read(&mut [0; 1]).unwrap();
     });
+    panics("a burst without its command", "begins with its command", &|b| {
+        b.picture_bus(0).read(&mut [0; 640]).unwrap();
+    });
     panics("a burst before a frame", "before a frame", &|b| {
         spi(b, &[0x84, 0x01]);
         b.picture_bus(0).transaction(&mut [Operation::Write(&[0x3C]), Operation::Read(&mut [0; 4])]).unwrap();
