@@ -6,7 +6,7 @@
 //! other, and nothing here depends on which of them answers.
 
 use super::registers::{
-    BANK, BARS, Bank, COM7, PRODUCT_HIGH, PRODUCT_LOW, RESET, SVGA, TABLE, WITNESSES, Write, exposure,
+    BANK, BARS, Bank, COM7, PRODUCT_HIGH, PRODUCT_LOW, RESET, RESOLUTION, TABLE, WITNESSES, Write, exposure,
 };
 use crate::ports::{CameraFault, Exposure};
 use embedded_hal::i2c::I2c;
@@ -85,7 +85,7 @@ impl<I: I2c> Sensor<I> {
     /// A silent bus.
     pub fn show_bars(&mut self, on: bool) -> Result<(), CameraFault> {
         self.choose(Bank::Sensor)?;
-        self.write((COM7, if on { SVGA | BARS } else { SVGA }))
+        self.write((COM7, RESOLUTION | if on { BARS } else { 0 }))
     }
 
     fn choose(&mut self, bank: Bank) -> Result<(), CameraFault> {

@@ -11,10 +11,14 @@ pub const WIDTH: usize = 320;
 /// Rows of a picture, px.
 pub const HEIGHT: usize = 240;
 
-/// Columns and rows that the sensor hands to the DSP in SVGA.
+/// COM7: the resolution, SVGA.
+pub const RESOLUTION: u8 = 0x40;
+/// Columns and rows that the sensor hands to the DSP at that resolution.
 const ARRAY: (u16, u16) = (800, 600);
-/// First column and row of the image in SVGA, each counting as two.
+/// First column and row of the image at that resolution, each counting as two.
 const FIRST: (u16, u16) = (137, 2);
+/// How often the DSP halves that before it scales it to the picture.
+const HALVINGS: u8 = (ARRAY.0 / WIDTH as u16).ilog2() as u8;
 
 /// Chooses what the addresses mean, in either bank.
 pub const BANK: u8 = 0xFF;
@@ -57,8 +61,6 @@ pub const EXPOSURE_HIGH: u8 = 0x45;
 
 /// COM7: reset.
 pub const RESET: u8 = 0x80;
-/// COM7: SVGA.
-pub const SVGA: u8 = 0x40;
 /// COM7: colour bars.
 pub const BARS: u8 = 0x02;
 
@@ -71,7 +73,9 @@ const WINDOW_WIDTH: u8 = 0x51;
 const WINDOW_HEIGHT: u8 = 0x52;
 const OFFSET_X: u8 = 0x53;
 const OFFSET_Y: u8 = 0x54;
+/// Bits 7 and 3: bit 8 of the window's height and width / 4; the others are of its offset.
 const WINDOW_HIGH: u8 = 0x55;
+/// Bit 7: bit 9 of the window's width / 4.
 const WINDOW_HIGHER: u8 = 0x57;
 /// Columns of the output / 4.
 pub const OUTPUT_WIDTH: u8 = 0x5A;
@@ -108,8 +112,8 @@ pub const TABLE: &[(Bank, &[Write])] = &[
     (
         Bank::Sensor,
         &[
-            (COM7, SVGA),
-            // A window of the whole array: SVGA has other bounds than the full size, which a reset gives.
+            (COM7, RESOLUTION),
+            // A window of the whole array: its bounds are other than those of the full size, which a reset gives.
             (FIRST_COLUMN, high(FIRST.0, 3)),
             (LAST_COLUMN, high(LAST.0, 3)),
             (COLUMN_LOW, ((LAST.0 & 7) << 3 | FIRST.0 & 7) as u8),
@@ -129,14 +133,13 @@ pub const TABLE: &[(Bank, &[Write])] = &[
             (ARRAY_HEIGHT, high(ARRAY.1, 3)),
             (ARRAY_LOW, ((ARRAY.0 & 7) << 3 | ARRAY.1 & 7) as u8),
             (MODULES2, 0x2D),
-            // Halves of the array, averaged.
-            (DIVIDE, 0x80 | 1 << 3 | 1),
+            (DIVIDE, 0x80 | HALVINGS << 3 | HALVINGS),
             (WINDOW_WIDTH, high(ARRAY.0, 2)),
             (WINDOW_HEIGHT, high(ARRAY.1, 2)),
             (OFFSET_X, 0),
             (OFFSET_Y, 0),
-            (WINDOW_HIGH, 0),
-            (WINDOW_HIGHER, 0),
+            (WINDOW_HIGH, (high(ARRAY.1, 10) & 1) << 7 | (high(ARRAY.0, 10) & 1) << 3),
+            (WINDOW_HIGHER, (high(ARRAY.0, 11) & 1) << 7),
             (OUTPUT_WIDTH, high(WIDTH as u16, 2)),
             (OUTPUT_HEIGHT, high(HEIGHT as u16, 2)),
             (OUTPUT_HIGH, 0),
