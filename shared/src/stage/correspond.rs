@@ -41,7 +41,7 @@ const OMEGA: usize = 3;
 const CUT_HEIGHTS: [i32; HULL_CUTS] = [1407, 11_733, 28_161, 45_000, 57_893, 64_677];
 
 /// Errors that differ by no more than this tie, in 1/65536 of log2^2: noise of a sphere gives 0.1, a view
-/// that was mirrored 2 and more (docs/decisions/0005-gates.md).
+/// that was mirrored 1.5 and more, if any (docs/decisions/0005-gates.md).
 const TIE: u32 = ONE as u32;
 
 /// Two hulls, cut and compared.
