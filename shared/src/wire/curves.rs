@@ -1,7 +1,7 @@
 //! A shape's branches with their curves.
 //!
 //! ```text
-//! each branch:  nodes 2 x 16 bits | closed 1 | weighted 1 | control points 10
+//! each branch:  both nodes | number of control points | closed 1 bit | weighted 1
 //! each control: u, v | radius | disparity beyond the plane | weight 32 bits where weighted
 //! ```
 //!
@@ -16,23 +16,30 @@ use crate::limits::{CapacityError, push};
 use crate::pipeline::Branch;
 use crate::point::PixelPoint;
 use crate::stage::branch::Ball;
-use crate::stage::nurbs::{Control, MAX_CONTROLS, Nurbs};
+use crate::stage::nurbs::Control;
 use crate::stage::plane::ImagePlane;
 
-/// Bits of a number of control points.
-const COUNT_BITS: u32 = 10;
-const _: () = assert!(MAX_CONTROLS < 1 << COUNT_BITS);
-
 struct Curves {
+    nodes: Channel,
+    counts: Channel,
     positions: Positions,
     radii: Channel,
     excesses: Channel,
 }
 
 impl Curves {
-    fn new() -> Self {
-        let channel = || Channel::new(Expect::Onward);
-        Self { positions: Positions::new(Expect::Onward), radii: channel(), excesses: channel() }
+    const fn new() -> Self {
+        Self {
+            nodes: Channel::new(Expect::Same),
+            counts: Channel::new(Expect::Same),
+            positions: Positions::new(Expect::Onward),
+            radii: Channel::new(Expect::Onward),
+            excesses: Channel::new(Expect::Onward),
+        }
+    }
+
+    fn node(&mut self, bits: &mut BitReader<'_, '_>) -> Result<u16, WireError> {
+        u16::try_from(self.nodes.read(bits)?).map_err(|_| WireError::Invalid("node"))
     }
 
     const fn restart(&mut self) {
@@ -54,11 +61,11 @@ pub(super) fn write_branches(
         let controls = branch.curve(shape.controls).ok_or(missing)?.controls();
         let weighted = controls.iter().any(|c| c.weight != ONE);
         for node in branch.nodes {
-            bits.put(u32::from(node), 16);
+            curves.nodes.write(node.into(), bits);
         }
+        curves.counts.write(controls.len() as i32, bits);
         bits.put(u32::from(branch.closed), 1);
         bits.put(u32::from(weighted), 1);
-        bits.put(controls.len() as u32, COUNT_BITS);
         curves.restart();
         for Control { ball, weight } in controls {
             curves.positions.write(ball.at(), bits);
@@ -81,19 +88,21 @@ pub(super) fn read_branches(
 ) -> Result<(), WireError> {
     let mut curves = Curves::new();
     for _ in 0..branches {
-        let nodes = [bits.take(16)? as u16, bits.take(16)? as u16];
+        let nodes = [curves.node(bits)?, curves.node(bits)?];
+        let count = curves.counts.read(bits)?;
         let (closed, weighted) = (bits.flag()?, bits.flag()?);
-        let (controls, control_count) = (lists.controls.len(), bits.take(COUNT_BITS)? as usize);
         curves.restart();
-        for _ in 0..control_count {
+        let controls = lists.controls.len();
+        for _ in 0..count {
             let at @ PixelPoint { u, v } = curves.positions.read(bits)?;
-            let rho = length(&mut curves.radii, bits)?;
+            let rho = length(curves.radii.read(bits)?)?;
             let d = disparity(curves.excesses.read(bits)?, at, plane);
             let weight = if weighted { bits.take(32)? as i32 } else { ONE };
             push(lists.controls, Control { ball: Ball { u, v, rho, d }, weight }, "control points")?;
         }
+        let control_count = lists.controls.len() - controls;
         let branch = Branch { nodes, samples: 0, sample_count: 0, controls, control_count, closed };
-        if branch.curve(lists.controls).as_ref().map(Nurbs::closed) != Some(closed) {
+        if branch.curve(lists.controls).is_none() {
             return Err(WireError::Invalid("number of control points"));
         }
         push(lists.branches, branch, "branches")?;

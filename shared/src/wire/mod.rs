@@ -26,6 +26,7 @@ mod outline;
 mod picture;
 mod rice;
 mod shape;
+mod walk;
 
 pub use calibration::calibration_crc;
 pub use command::{ExposureSetting, ToDevice};
