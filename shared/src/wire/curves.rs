@@ -8,7 +8,7 @@
 //! A curve that is not weighted has unit weights, as every fit gives them.
 
 use super::WireError;
-use super::outline::{Positions, disparity, excess, length, sent, steps};
+use super::outline::{disparity, excess, length, sent, steps};
 use super::rice::{BitReader, BitWriter, Channel, Expect};
 use super::shape::{POSITION_STEP, Shape, ShapeLists};
 use crate::fixed::ONE;
@@ -19,33 +19,40 @@ use crate::stage::branch::Ball;
 use crate::stage::nurbs::Control;
 use crate::stage::plane::ImagePlane;
 
+/// A control point in numbers to send: u, v, radius, disparity beyond the plane.
+type Numbers = [i32; 4];
+
+fn numbers(ball: Ball, plane: &ImagePlane) -> Numbers {
+    let [u, v, rho] = [ball.u, ball.v, ball.rho].map(|x| steps(x, POSITION_STEP));
+    [u, v, rho, excess(ball.d, sent(ball.at()), plane)]
+}
+
+fn ball([u, v, rho, excess]: Numbers, plane: &ImagePlane) -> Result<Ball, WireError> {
+    let (u, v, rho) = (length(u)?, length(v)?, length(rho)?);
+    Ok(Ball { u, v, rho, d: disparity(excess, PixelPoint { u, v }, plane) })
+}
+
 struct Curves {
     nodes: Channel,
     counts: Channel,
-    positions: Positions,
-    radii: Channel,
-    excesses: Channel,
+    channels: [Channel; 4],
 }
 
 impl Curves {
-    const fn new() -> Self {
-        Self {
-            nodes: Channel::new(Expect::Same),
-            counts: Channel::new(Expect::Same),
-            positions: Positions::new(Expect::Onward),
-            radii: Channel::new(Expect::Onward),
-            excesses: Channel::new(Expect::Onward),
-        }
+    fn new() -> Self {
+        let unsteady = || Channel::new(Expect::Same);
+        let channels = [(); 4].map(|()| Channel::new(Expect::Onward));
+        Self { nodes: unsteady(), counts: unsteady(), channels }
     }
 
     fn node(&mut self, bits: &mut BitReader<'_, '_>) -> Result<u16, WireError> {
         u16::try_from(self.nodes.read(bits)?).map_err(|_| WireError::Invalid("node"))
     }
 
-    const fn restart(&mut self) {
-        self.positions.restart();
-        self.radii.restart();
-        self.excesses.restart();
+    fn restart(&mut self) {
+        for channel in &mut self.channels {
+            channel.restart();
+        }
     }
 }
 
@@ -68,9 +75,9 @@ pub(super) fn write_branches(
         bits.put(u32::from(weighted), 1);
         curves.restart();
         for Control { ball, weight } in controls {
-            curves.positions.write(ball.at(), bits);
-            curves.radii.write(steps(ball.rho, POSITION_STEP), bits);
-            curves.excesses.write(excess(ball.d, sent(ball.at()), plane), bits);
+            for (channel, x) in curves.channels.iter_mut().zip(numbers(*ball, plane)) {
+                channel.write(x, bits);
+            }
             if weighted {
                 bits.put(*weight as u32, 32);
             }
@@ -91,14 +98,15 @@ pub(super) fn read_branches(
         let nodes = [curves.node(bits)?, curves.node(bits)?];
         let count = curves.counts.read(bits)?;
         let (closed, weighted) = (bits.flag()?, bits.flag()?);
-        curves.restart();
         let controls = lists.controls.len();
+        curves.restart();
         for _ in 0..count {
-            let at @ PixelPoint { u, v } = curves.positions.read(bits)?;
-            let rho = length(curves.radii.read(bits)?)?;
-            let d = disparity(curves.excesses.read(bits)?, at, plane);
+            let mut numbers = Numbers::default();
+            for (channel, x) in curves.channels.iter_mut().zip(&mut numbers) {
+                *x = channel.read(bits)?;
+            }
             let weight = if weighted { bits.take(32)? as i32 } else { ONE };
-            push(lists.controls, Control { ball: Ball { u, v, rho, d }, weight }, "control points")?;
+            push(lists.controls, Control { ball: ball(numbers, plane)?, weight }, "control points")?;
         }
         let control_count = lists.controls.len() - controls;
         let branch = Branch { nodes, samples: 0, sample_count: 0, controls, control_count, closed };

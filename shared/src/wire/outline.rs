@@ -26,32 +26,6 @@ pub(super) fn steps(x: i32, step: i32) -> i32 {
     div_round(i64::from(x.clamp(-RANGE, RANGE)), i64::from(step)) as i32
 }
 
-/// A position that is sent: rows of points share the channels of u and v.
-pub(super) struct Positions {
-    u: Channel,
-    v: Channel,
-}
-
-impl Positions {
-    pub(super) const fn new(expect: Expect) -> Self {
-        Self { u: Channel::new(expect), v: Channel::new(expect) }
-    }
-
-    pub(super) const fn restart(&mut self) {
-        self.u.restart();
-        self.v.restart();
-    }
-
-    pub(super) fn write(&mut self, p: PixelPoint, bits: &mut BitWriter<'_, '_>) {
-        self.u.write(steps(p.u, POSITION_STEP), bits);
-        self.v.write(steps(p.v, POSITION_STEP), bits);
-    }
-
-    pub(super) fn read(&mut self, bits: &mut BitReader<'_, '_>) -> Result<PixelPoint, WireError> {
-        Ok(PixelPoint { u: length(self.u.read(bits)?)?, v: length(self.v.read(bits)?)? })
-    }
-}
-
 /// A coordinate or radius of so many steps, 1/256 px.
 pub(super) fn length(steps: i32) -> Result<i32, WireError> {
     let x = steps.checked_mul(POSITION_STEP);
@@ -168,9 +142,10 @@ pub(super) fn read_contour(
 
 /// Append a row of points.
 pub(super) fn write_points(points: &[PixelPoint], bits: &mut BitWriter<'_, '_>) {
-    let mut positions = Positions::new(Expect::Same);
+    let (mut u, mut v) = (Channel::new(Expect::Same), Channel::new(Expect::Same));
     for p in points {
-        positions.write(*p, bits);
+        u.write(steps(p.u, POSITION_STEP), bits);
+        v.write(steps(p.v, POSITION_STEP), bits);
     }
 }
 
@@ -180,9 +155,9 @@ pub(super) fn read_points(
     bits: &mut BitReader<'_, '_>,
     mut take: impl FnMut(PixelPoint) -> Result<(), CapacityError>,
 ) -> Result<(), WireError> {
-    let mut positions = Positions::new(Expect::Same);
+    let (mut u, mut v) = (Channel::new(Expect::Same), Channel::new(Expect::Same));
     for _ in 0..count {
-        take(positions.read(bits)?)?;
+        take(PixelPoint { u: length(u.read(bits)?)?, v: length(v.read(bits)?)? })?;
     }
     Ok(())
 }

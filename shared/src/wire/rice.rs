@@ -160,7 +160,7 @@ impl Channel {
         }
     }
 
-    /// Another curve begins.
+    /// Another curve begins; the first guess is where the last one ended.
     pub(super) const fn restart(&mut self) {
         self.known = 0;
     }
