@@ -6,5 +6,7 @@
 //! action), `camera/` (sensor drivers over embedded-hal 1.0) and `board/`, which alone may touch registers.
 #![no_std]
 
+pub mod camera;
 pub mod memory;
+pub mod ports;
 pub mod selftest;

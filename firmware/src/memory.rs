@@ -1,51 +1,153 @@
-//! The memory that the core borrows, sized for small pictures: 160x120 px fit the board's largest
-//! bank of RAM.
+//! The memory that the core borrows, for pictures of a fixed size.
+//!
+//! One block of scratch serves every step of a run, and holds the picture before it: what a step needs in
+//! passing, the next one has again. A picture is gone when its outline is known, so both eyes share the
+//! place.
 
 use heapless::Vec;
-use shared::bitmap::{Size, WORD_BITS, Word};
-use shared::pipeline::{Branch, EyeMemory, MAX_COVER, Memory, Scratch};
+use shared::arena;
+use shared::bitmap::{Size, Word};
+use shared::pipeline::{Branch, EyeMemory, Memory, outline_words, scratch_words};
 use shared::point::{Pixel, PixelPoint};
-use shared::stage::branch::{Ball, Sample};
-use shared::stage::contour::{ContourLoop, ContourPoint, EdgeCrossing};
+use shared::stage::branch::Sample;
+use shared::stage::contour::{ContourLoop, ContourPoint};
 use shared::stage::depth::BallDepth;
-use shared::stage::distance::{Parabola, scratch_parabolas};
 use shared::stage::graph::{Edge, Graph, Member, Node};
 use shared::stage::medial::MedialBall;
+use shared::stage::nearest::Pair;
 use shared::stage::nurbs::Control;
-use shared::stage::prune::Tip;
-use shared::stage::rows::{ContourMatch, RowCrossing, Trusted};
-use shared::stage::thinning::scratch_order;
+use shared::stage::rows::ContourMatch;
 
-/// Columns of a picture, px.
-pub const WIDTH: usize = 160;
-/// Rows of a picture, px.
-pub const HEIGHT: usize = 120;
-
-const PIXELS: usize = WIDTH * HEIGHT;
-const WORDS: usize = WIDTH.div_ceil(WORD_BITS) * HEIGHT;
-/// Contour points: one a pixel of arc, for an outline of three times the picture's circumference.
-const POINTS: usize = 1536;
-/// Pixels of a skeleton, and samples of its branches with their tips.
-const PATH: usize = 512;
-/// Nodes, edges and loops of a skeleton.
+/// Nodes, edges and loops.
 const PARTS: usize = 64;
-/// Control points of all curves: one per 8 px, and three more a branch.
-const CONTROLS: usize = 256;
-/// Pixels of the largest object that the pipeline does not refuse.
-const OBJECT: usize = PIXELS * MAX_COVER as usize / 100 + 1;
-/// The largest distance to the background, 1/16 px: half the picture's height.
-const DEPTH: u16 = HEIGHT as u16 * 16 / 2;
 
-/// One eye's lists.
+/// A picture's size and what it may hold.
+#[derive(Clone, Copy, Debug)]
+pub struct Capacities {
+    /// The pictures' size.
+    pub size: Size,
+    /// Points of a contour, one a pixel of arc.
+    pub points: usize,
+    /// Pixels of a skeleton, and samples of its branches with their tips.
+    pub path: usize,
+    /// Control points of all curves: one per 8 px, and three more a branch.
+    pub controls: usize,
+}
+
+impl Capacities {
+    /// Words of a mask.
+    pub const fn mask(self) -> usize {
+        self.size.words()
+    }
+
+    /// Words of scratch: those of the core, or a picture beside the core's first step.
+    pub const fn scratch(self) -> usize {
+        let core = scratch_words(self.size, self.points, self.controls, 0);
+        let first = arena::words::<u8>(self.size.pixels()) + outline_words(self.size, self.points);
+        if core > first { core } else { first }
+    }
+
+    /// Vertices of a hull while it is made: two a row, and top and bottom.
+    pub const fn hull(self) -> usize {
+        2 * self.size.height + 4
+    }
+}
+
+/// Memory of a certain size, for a `static`.
+pub trait Storage {
+    /// What it is for.
+    const CAPACITIES: Capacities;
+
+    /// Lend it to a run of the pipeline.
+    fn lend(&mut self) -> Memory<'_>;
+}
+
+/// Define a [`Storage`]. The right eye is outlined only, which is all that the default method asks of it.
+macro_rules! storage {
+    ($(#[$doc:meta])* $name:ident, $capacities:expr) => {
+        $(#[$doc])*
+        #[derive(Debug)]
+        pub struct $name {
+            left: Eye<{ $capacities.mask() }, { $capacities.hull() }, { $capacities.points }>,
+            right: Eye<{ $capacities.mask() }, { $capacities.hull() }, { $capacities.points }>,
+            described: Skeleton<PARTS, { $capacities.path }, { $capacities.controls }>,
+            looked_at: Skeleton<0, 0, 0>,
+            matches: Vec<ContourMatch, { $capacities.points }>,
+            balls: Vec<MedialBall, { $capacities.points }>,
+            depths: Vec<BallDepth, { $capacities.points }>,
+            pairs: [Vec<Pair, 0>; 2],
+            scratch: [u64; $capacities.scratch()],
+        }
+
+        impl $name {
+            /// Empty memory.
+            #[expect(clippy::new_without_default, reason = "a default value would be built on the stack")]
+            pub const fn new() -> Self {
+                Self {
+                    left: Eye::new(),
+                    right: Eye::new(),
+                    described: Skeleton::new(),
+                    looked_at: Skeleton::new(),
+                    matches: Vec::new(),
+                    balls: Vec::new(),
+                    depths: Vec::new(),
+                    pairs: [Vec::new(), Vec::new()],
+                    scratch: [0; $capacities.scratch()],
+                }
+            }
+        }
+
+        impl Storage for $name {
+            const CAPACITIES: Capacities = $capacities;
+
+            fn lend(&mut self) -> Memory<'_> {
+                let [boundary_pairs, skeleton_pairs] = &mut self.pairs;
+                Memory {
+                    eyes: [self.left.lend(&mut self.described), self.right.lend(&mut self.looked_at)],
+                    matches: &mut self.matches,
+                    balls: &mut self.balls,
+                    depths: &mut self.depths,
+                    boundary_pairs,
+                    skeleton_pairs,
+                    scratch: &mut self.scratch,
+                }
+            }
+        }
+    };
+}
+
+const SMALL: Capacities =
+    Capacities { size: Size { width: 160, height: 120 }, points: 480, path: 240, controls: 96 };
+const QVGA: Capacities =
+    Capacities { size: Size { width: 320, height: 240 }, points: 1536, path: 768, controls: 256 };
+const VGA: Capacities =
+    Capacities { size: Size { width: 640, height: 480 }, points: 4096, path: 1536, controls: 512 };
+
+storage! {
+    /// Pictures of 160x120 px: for boards with 128 KB of RAM.
+    Small, SMALL
+}
+storage! {
+    /// Pictures of 320x240 px: the camera modules' own size.
+    Qvga, QVGA
+}
+storage! {
+    /// Pictures of 640x480 px: for emulated boards with megabytes.
+    Vga, VGA
+}
+
+/// What both eyes have: mask and contour.
 #[derive(Debug)]
-struct Eye {
-    mask: [Word; WORDS],
-    skeleton: [Word; WORDS],
-    rows: [u32; HEIGHT + 1],
+struct Eye<const MASK: usize, const HULL: usize, const POINTS: usize> {
+    mask: [Word; MASK],
     contour: Vec<ContourPoint, POINTS>,
     loops: Vec<ContourLoop, PARTS>,
-    hull: Vec<PixelPoint, { 2 * HEIGHT + 4 }>,
-    crossings: Vec<RowCrossing, POINTS>,
+    hull: Vec<PixelPoint, HULL>,
+}
+
+/// A skeleton, its graph and its curves.
+#[derive(Debug)]
+struct Skeleton<const PARTS: usize, const PATH: usize, const CONTROLS: usize> {
     nodes: Vec<Node, PARTS>,
     edges: Vec<Edge, PARTS>,
     path: Vec<Pixel, PATH>,
@@ -55,16 +157,36 @@ struct Eye {
     controls: Vec<Control, CONTROLS>,
 }
 
-impl Eye {
+impl<const MASK: usize, const HULL: usize, const POINTS: usize> Eye<MASK, HULL, POINTS> {
+    const fn new() -> Self {
+        Self { mask: [0; MASK], contour: Vec::new(), loops: Vec::new(), hull: Vec::new() }
+    }
+
+    fn lend<'a, const PARTS: usize, const PATH: usize, const CONTROLS: usize>(
+        &'a mut self,
+        skeleton: &'a mut Skeleton<PARTS, PATH, CONTROLS>,
+    ) -> EyeMemory<'a> {
+        EyeMemory {
+            mask: &mut self.mask,
+            contour: &mut self.contour,
+            loops: &mut self.loops,
+            hull: &mut self.hull,
+            graph: Graph {
+                nodes: &mut skeleton.nodes,
+                edges: &mut skeleton.edges,
+                path: &mut skeleton.path,
+                members: &mut skeleton.members,
+            },
+            samples: &mut skeleton.samples,
+            branches: &mut skeleton.branches,
+            controls: &mut skeleton.controls,
+        }
+    }
+}
+
+impl<const PARTS: usize, const PATH: usize, const CONTROLS: usize> Skeleton<PARTS, PATH, CONTROLS> {
     const fn new() -> Self {
         Self {
-            mask: [0; WORDS],
-            skeleton: [0; WORDS],
-            rows: [0; HEIGHT + 1],
-            contour: Vec::new(),
-            loops: Vec::new(),
-            hull: Vec::new(),
-            crossings: Vec::new(),
             nodes: Vec::new(),
             edges: Vec::new(),
             path: Vec::new(),
@@ -74,108 +196,11 @@ impl Eye {
             controls: Vec::new(),
         }
     }
-
-    fn lend(&mut self) -> EyeMemory<'_> {
-        EyeMemory {
-            mask: &mut self.mask,
-            skeleton: &mut self.skeleton,
-            rows: &mut self.rows,
-            contour: &mut self.contour,
-            loops: &mut self.loops,
-            hull: &mut self.hull,
-            crossings: &mut self.crossings,
-            graph: Graph {
-                nodes: &mut self.nodes,
-                edges: &mut self.edges,
-                path: &mut self.path,
-                members: &mut self.members,
-            },
-            samples: &mut self.samples,
-            branches: &mut self.branches,
-            controls: &mut self.controls,
-        }
-    }
 }
 
-/// All memory of the pipeline, for a `static`.
-#[derive(Debug)]
-pub struct Storage {
-    eyes: [Eye; 2],
-    grey: [u8; PIXELS],
-    words: [Word; 2 * WORDS],
-    plane: [u16; PIXELS],
-    parabolas: [Parabola; scratch_parabolas(WIDTH)],
-    order: [u32; scratch_order(OBJECT, DEPTH)],
-    entries: [i64; 7 * CONTROLS],
-    sides: [[i64; 4]; CONTROLS],
-    edges: Vec<EdgeCrossing, { 2 * POINTS }>,
-    tips: Vec<Tip, PARTS>,
-    trusted: Vec<Trusted, POINTS>,
-    points: Vec<Ball, 0>,
-    matches: Vec<ContourMatch, POINTS>,
-    balls: Vec<MedialBall, POINTS>,
-    depths: Vec<BallDepth, POINTS>,
-    boundary_pairs: Vec<shared::stage::nearest::Pair, 0>,
-    skeleton_pairs: Vec<shared::stage::nearest::Pair, 0>,
-}
-
-impl Storage {
-    /// Empty memory.
-    #[expect(clippy::new_without_default, reason = "a default value would be built on the stack")]
-    pub const fn new() -> Self {
-        Self {
-            eyes: [Eye::new(), Eye::new()],
-            grey: [0; PIXELS],
-            words: [0; 2 * WORDS],
-            plane: [0; PIXELS],
-            parabolas: [Parabola::NONE; scratch_parabolas(WIDTH)],
-            order: [0; scratch_order(OBJECT, DEPTH)],
-            entries: [0; 7 * CONTROLS],
-            sides: [[0; 4]; CONTROLS],
-            edges: Vec::new(),
-            tips: Vec::new(),
-            trusted: Vec::new(),
-            points: Vec::new(),
-            matches: Vec::new(),
-            balls: Vec::new(),
-            depths: Vec::new(),
-            boundary_pairs: Vec::new(),
-            skeleton_pairs: Vec::new(),
-        }
-    }
-
-    /// The pictures that it is for.
-    pub const fn size() -> Size {
-        Size { width: WIDTH, height: HEIGHT }
-    }
-
-    /// Lend it to a run of the pipeline.
-    pub fn lend(&mut self) -> Memory<'_> {
-        let [left, right] = &mut self.eyes;
-        Memory {
-            eyes: [left.lend(), right.lend()],
-            scratch: Scratch {
-                grey: &mut self.grey,
-                words: &mut self.words,
-                plane: &mut self.plane,
-                parabolas: &mut self.parabolas,
-                order: &mut self.order,
-                edges: &mut self.edges,
-                tips: &mut self.tips,
-                trusted: &mut self.trusted,
-                points: &mut self.points,
-                entries: &mut self.entries,
-                sides: &mut self.sides,
-            },
-            matches: &mut self.matches,
-            balls: &mut self.balls,
-            depths: &mut self.depths,
-            boundary_pairs: &mut self.boundary_pairs,
-            skeleton_pairs: &mut self.skeleton_pairs,
-        }
-    }
-}
-
-/// The board's RAM less the two pictures, the stack and what the runtime keeps.
-const BUDGET: usize = 512 * 1024 - 2 * PIXELS - 64 * 1024;
-const _: () = assert!(size_of::<Storage>() <= BUDGET, "the core's memory must fit the board");
+// On the boards themselves, where a word has 32 bits.
+#[cfg(target_pointer_width = "32")]
+const _: () = {
+    assert!(size_of::<Small>() <= 104 * 1024, "the small profile leaves 24 KB of 128 for stack and runtime");
+    assert!(size_of::<Qvga>() <= 384 * 1024, "the board's profile leaves 16 KB of 400 for drivers");
+};

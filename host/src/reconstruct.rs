@@ -23,7 +23,7 @@ use nalgebra::{Point2, Point3, Vector3};
 use serde::Serialize;
 use shared::bitmap::{Grey, Size};
 use shared::fixed::PX;
-use shared::pipeline::{self, Finding, Memory, Observer, Outcome, Settings, Side};
+use shared::pipeline::{self, Finding, Memory, Observer, Outcome, Settings, Side, scratch_words};
 use shared::stage::binarise;
 use shared::stage::contour::ContourLoop;
 use shared::stage::correspond::PaperMatching;
@@ -275,13 +275,13 @@ pub(crate) fn settings(camera: &RectifiedCamera, options: &Options) -> Settings 
 
 fn core_settings(optics: Optics, options: &Options) -> Settings {
     let chosen = match options.mode {
+        Mode::Default if options.profile == Profile::Device => Settings::device(optics),
         Mode::Default => Settings::new(optics),
         Mode::Paper { omega } => Settings::paper(optics, PaperMatching { omega, ..PaperMatching::default() }),
     };
     Settings {
         threshold: options.threshold,
         polarity: options.polarity,
-        sub_pixel: options.profile == Profile::Full,
         thinning: options.thinning.unwrap_or(chosen.thinning),
         pruning: options.branches.map_or(chosen.pruning, Pruning::Branches),
         ..chosen
@@ -313,9 +313,8 @@ fn rectification(
 fn object_box(image: &GrayImage, side: Side, settings: &Settings) -> Result<PixelBox, Finding> {
     let grey = grey(image)?;
     let size = grey.size();
-    let mut words = vec![0; 3 * size.words()];
-    let (mask, scratch) = words.split_at_mut(size.words());
-    let found = pipeline::object_box(side, grey, (mask, &mut vec![0; size.pixels()], scratch), settings)?;
+    let (mut mask, mut scratch) = (vec![0; size.words()], vec![0; scratch_words(size, 0, 0, 0)]);
+    let found = pipeline::object_box(side, grey, (&mut mask, &mut scratch), settings)?;
     let corner = |p: shared::point::Pixel| Point2::new(f64::from(p.u), f64::from(p.v));
     Ok(PixelBox { min: corner(found.min), max: corner(found.max) })
 }
@@ -355,7 +354,7 @@ fn grow(
             let all = balls::balls(camera, &edges, memory.balls, memory.depths);
             (all, eye.loops.iter().map(chain).collect())
         }
-        Skeleton::Nurbs => curve_balls(camera, &edges, eye.branches, eye.controls)?,
+        Skeleton::Nurbs => curve_balls(camera, &edges, eye.branches, eye.controls),
     };
     if options.profile == Profile::Full {
         refine(camera, &edges, &mut grown);

@@ -4,6 +4,7 @@
 
 // Foundation.
 pub mod limits;
+pub mod arena;
 pub mod fixed;
 pub mod point;
 pub mod bitmap;

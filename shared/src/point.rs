@@ -1,9 +1,11 @@
 //! Points of the image plane and the one exact predicate on them.
 
 use crate::fixed::{PX, UNIT, div_round, hypot};
+use bytemuck::{Pod, Zeroable};
 
 /// A pixel by column and row.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Pod, Zeroable)]
+#[repr(C)]
 pub struct Pixel {
     /// Column, px from the left.
     pub u: u16,
@@ -20,7 +22,8 @@ impl Pixel {
 
 /// A point of the image plane in 1/256 px; pixel centres lie at whole pixels, v points down.
 /// |u|, |v| < 2^20.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Pod, Zeroable)]
+#[repr(C)]
 pub struct PixelPoint {
     /// Horizontal coordinate, 1/256 px.
     pub u: i32,

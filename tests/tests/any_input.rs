@@ -145,8 +145,8 @@ fn memory_that_is_too_short_is_a_finding() {
         assert!(answer(&mut core, &pair, settings).is_ok(), "{:?}", answer(&mut core, &pair, settings));
         for part in oracle::core::PARTS {
             let unused: &[&str] = match mode {
-                0 => &["points", "boundary pairs", "skeleton pairs"],
-                _ => &["grey", "order", "crossings", "rows", "trusted", "matches", "balls", "depths"],
+                0 => &["boundary pairs", "skeleton pairs"],
+                _ => &["matches", "balls", "depths"],
             };
             let found = core.run([&pair[0], &pair[1]], settings, part, &mut (), check);
             let refused = matches!(found, Err(Finding::Capacity(_)));

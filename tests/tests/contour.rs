@@ -3,21 +3,21 @@
 use heapless::Vec as List;
 use oracle::core::{Picture, picture, size};
 use oracle::raster::{self as naive, Image, Random};
-use shared::bitmap::{Bitmap, Grey};
+use shared::arena::Arena;
+use shared::bitmap::Grey;
 use shared::fixed::PX;
 use shared::stage::contour::{ContourLoop, ContourPoint, contour, frontier};
 
 /// The outline of what is above 100.
 fn outline(picture: &Picture) -> (Vec<ContourPoint>, Vec<ContourLoop>, Image) {
     let image: Image = picture.iter().map(|row| row.iter().map(|&g| g > 100).collect()).collect();
-    let (mut words, mut seen, bytes) = (naive::words(&image), naive::words(&image), picture.concat());
+    let (mut words, bytes) = (naive::words(&image), picture.concat());
     let (size, mask) = (size(picture), naive::bitmap(&image, &mut words));
-    let mut seen = Bitmap::new(size, &mut seen).unwrap();
-    let mut cracks = Box::new(List::<_, 16384>::new());
+    let mut block = vec![7; 1 << 16];
     let mut points = Box::new(List::<_, 16384>::new());
     let mut loops = Box::new(List::<_, 4096>::new());
     let grey = Grey::new(size, size.width, &bytes).unwrap();
-    contour(Some(grey), &mask, &mut seen, &mut *cracks, &mut *points, &mut *loops).unwrap();
+    contour(Some(grey), &mask, Arena::new(&mut block), &mut *points, &mut *loops).unwrap();
     (points.to_vec(), loops.to_vec(), image)
 }
 

@@ -4,10 +4,11 @@
 use heapless::Vec as List;
 use oracle::graph::{Grid, distance, from_art, random, thin, to_art, topology};
 use proptest::prelude::*;
+use shared::arena::Arena;
 use shared::bitmap::{Bitmap, Plane, Word};
 use shared::point::Pixel;
 use shared::stage::graph::{Edge, Graph, Member, Node, NodeKind, trace};
-use shared::stage::prune::{Pruning, Report, Tip, prune};
+use shared::stage::prune::{Pruning, Report, prune};
 use std::collections::HashMap;
 
 const MOST: usize = 4096;
@@ -54,14 +55,14 @@ fn traced(grid: &Grid) -> Box<Owned> {
 
 fn pruned(grid: &Grid, plane: &[u16], rule: Pruning) -> (Grid, Report, Box<Owned>) {
     let mut owned = Box::<Owned>::default();
-    let mut tips = List::<Tip, MOST>::new();
-    let (art, report) = with_bitmap(grid, |bitmap, seen| {
+    let mut block = vec![7; 1 << 14];
+    let (art, report) = with_bitmap(grid, |bitmap, _| {
         let mut data = vec![0; plane.len()];
         let mut distance = Plane::new(bitmap.size(), &mut data).unwrap();
         for (v, row) in plane.chunks(bitmap.size().width.max(1)).enumerate() {
             distance.row_mut(v).copy_from_slice(row);
         }
-        let report = prune(bitmap, &distance, rule, seen, &mut tips, &mut owned.view()).unwrap();
+        let report = prune(bitmap, &distance, rule, Arena::new(&mut block), &mut owned.view()).unwrap();
         (format!("{bitmap:?}"), report)
     });
     (from_art(&art), report, owned)

@@ -3,6 +3,7 @@
 use heapless::Vec as List;
 use oracle::matching as naive;
 use oracle::raster::Random;
+use shared::arena::Arena;
 use shared::fixed::{ONE, PX, UNIT, hypot, log2};
 use shared::point::{Direction, PixelPoint};
 use shared::stage::contour::{ContourLoop, ContourPoint};
@@ -10,7 +11,7 @@ use shared::stage::invariants::{Measure, feature_vector};
 use shared::stage::medial::medial_balls;
 use shared::stage::nearest::pair_nearest;
 use shared::stage::plane::{AffineMap, ImagePlane, Observation};
-use shared::stage::rows::{Rows, Trusted, match_rows, row_crossings};
+use shared::stage::rows::{RowCrossing, count_crossings, match_rows, row_crossings};
 
 fn at(u: f64, v: f64) -> PixelPoint {
     let fixed = |x: f64| (x * f64::from(PX)).round() as i32;
@@ -204,9 +205,8 @@ fn crossings_are_where_the_outline_meets_the_rows() {
         let loops = [ContourLoop { start: 0, len: points.len() }];
         let offset = [0, 77, -300][case % 3];
         let mut first = [9; 241];
-        let mut crossings = List::<_, 2000>::new();
-        row_crossings(&points, &loops, offset, &mut first, &mut crossings).unwrap();
-        let rows = Rows { first: &first, crossings: &crossings };
+        let mut crossings = vec![RowCrossing::default(); count_crossings(&points, &loops, offset, 240)];
+        let rows = row_crossings(&points, &loops, offset, &mut first, &mut crossings);
         for v in 0..240 {
             let line = f64::from(v * PX + offset) / f64::from(PX);
             let mut expected: Vec<(f64, bool)> = Vec::new();
@@ -220,7 +220,7 @@ fn crossings_are_where_the_outline_meets_the_rows() {
             let row = rows.row(v as usize);
             assert_eq!(row.len(), expected.len(), "row {v}");
             for (c, (u, downwards)) in row.iter().zip(expected) {
-                assert!((f64::from(c.u) / f64::from(PX) - u).abs() < 0.01 && c.downwards == downwards);
+                assert!((f64::from(c.u) / f64::from(PX) - u).abs() < 0.01 && (c.heading > 0) == downwards);
             }
         }
     }
@@ -248,25 +248,24 @@ fn alignment_is_the_cheapest_of_all() {
         let ((points, loops), (right_points, right_loops)) = (bars(&left, height), bars(&right, height));
         let plane = ImagePlane { level: 10 * PX, ..ImagePlane::default() };
         let (mut first, mut right_first) = ([0; 10], [0; 10]);
-        let (mut crossings, mut right_crossings) = (List::<_, 256>::new(), List::<_, 256>::new());
-        row_crossings(&points, &loops, 0, &mut first, &mut crossings).unwrap();
-        row_crossings(&right_points, &right_loops, 0, &mut right_first, &mut right_crossings).unwrap();
-        let rows = Rows { first: &first, crossings: &crossings };
-        let right_rows = Rows { first: &right_first, crossings: &right_crossings };
-        let (mut matches, mut trusted) = (List::<_, 512>::new(), List::<Trusted, 512>::new());
+        let (mut crossings, mut right_crossings) =
+            ([RowCrossing::default(); 256], [RowCrossing::default(); 256]);
+        let rows = row_crossings(&points, &loops, 0, &mut first, &mut crossings);
+        let right_rows =
+            row_crossings(&right_points, &right_loops, 0, &mut right_first, &mut right_crossings);
+        let (mut matches, mut block) = (List::<_, 512>::new(), [7; 1024]);
         let statistics = match_rows(
             (&points, &loops),
             &right_points,
             (rows, right_rows),
             &plane,
             &mut matches,
-            &mut trusted,
+            Arena::new(&mut block),
         )
         .unwrap();
 
-        let edges = |row: &[shared::stage::rows::RowCrossing]| -> Vec<naive::Edge> {
-            row.iter().map(|c| (c.u, c.downwards)).collect()
-        };
+        let edges =
+            |row: &[RowCrossing]| -> Vec<naive::Edge> { row.iter().map(|c| (c.u, c.heading > 0)).collect() };
         let (a, b) = (edges(rows.row(4)), edges(right_rows.row(4)));
         let cost = |x: naive::Edge, y: naive::Edge| (x.0 - y.0 - 10 * PX).abs().min(30 * PX);
         // All rows are alike.

@@ -4,25 +4,25 @@
 use heapless::Vec as List;
 use oracle::nurbs as float;
 use proptest::prelude::*;
+use shared::arena::Arena;
 use shared::envelope::Envelope;
 use shared::stage::branch::{Ball, Sample};
-use shared::stage::nurbs::{Control, FitParams, LEAST_RADIUS, MAX_CONTROLS, Nurbs, Scratch, fit};
+use shared::stage::nurbs::{Control, FitParams, LEAST_RADIUS, MAX_CONTROLS, Nurbs, fit};
 
 const ONE: i32 = 1 << 16;
 
 type Controls = List<Control, MAX_CONTROLS>;
 
-fn fitted_within(samples: &[Sample], closed: bool, params: &FitParams, capacity: usize) -> Controls {
-    let (mut entries, mut sides) = (vec![0; 7 * capacity], vec![[0; 4]; capacity]);
+fn fitted_by(samples: &[Sample], closed: bool, params: &FitParams) -> Controls {
+    let mut block = vec![7; (7 + 4) * MAX_CONTROLS];
     let mut controls = Controls::new();
-    let mut scratch = Scratch { entries: &mut entries, sides: &mut sides };
-    let count = fit(samples, closed, params, &mut scratch, &mut controls).unwrap();
+    let count = fit(samples, closed, params, Arena::new(&mut block), &mut controls).unwrap();
     assert_eq!(count, controls.len());
     controls
 }
 
 fn fitted(samples: &[Sample], closed: bool) -> Controls {
-    fitted_within(samples, closed, &FitParams::default(), MAX_CONTROLS)
+    fitted_by(samples, closed, &FitParams::default())
 }
 
 fn balls(samples: &[Sample]) -> Vec<([f64; 4], f64)> {
@@ -44,8 +44,8 @@ fn length(samples: &[Sample], closed: bool) -> f64 {
 }
 
 /// The largest difference of the fit's control points from those of the definition, 1/256 px.
-fn error(samples: &[Sample], closed: bool, params: &FitParams, capacity: usize) -> f64 {
-    let controls = fitted_within(samples, closed, params, capacity);
+fn error(samples: &[Sample], closed: bool, params: &FitParams) -> f64 {
+    let controls = fitted_by(samples, closed, params);
     let pieces = ((length(samples, closed) / 256.0) as usize).clamp(if closed { 8 } else { 7 }, 0xFFFF);
     let expected = float::fit(
         &balls(samples),
@@ -95,7 +95,7 @@ fn control_points_equal_the_float_fit() {
     let params = FitParams::default();
     for (n, scale) in [(12, 2.0), (40, 8.0), (150, 25.0), (600, 95.0), (2000, 300.0)] {
         for closed in [false, true] {
-            let error = error(&wave(n, closed, scale, n as u64), closed, &params, MAX_CONTROLS);
+            let error = error(&wave(n, closed, scale, n as u64), closed, &params);
             assert!(error <= 1.0, "{n} balls, closed {closed}: {error}");
         }
     }
@@ -103,12 +103,13 @@ fn control_points_equal_the_float_fit() {
 
 #[test]
 fn other_parameters_and_few_control_points_too() {
-    for (spacing, smoothing, end_weight) in [(4, 0.01, 1), (8, 1.0, 100), (30, 8.0, 10), (2, 0.1, 10)] {
+    let spacings = [2, 4, 8, 30, 60, 100_000];
+    for (smoothing, end_weight) in [(0.01, 1), (1.0, 100), (8.0, 10), (0.1, 10)] {
         let smoothing = (smoothing * f64::from(ONE)) as i32;
-        let params = FitParams { spacing: spacing * 256, smoothing, end_weight };
-        for (closed, capacity) in [(false, 256), (true, 256), (false, 4), (true, 4), (true, 9)] {
-            let error = error(&wave(300, closed, 50.0, 7), closed, &params, capacity);
-            assert!(error <= 1.0, "{params:?}, closed {closed}, at most {capacity}: {error}");
+        for (spacing, closed) in spacings.into_iter().flat_map(|s| [(s, false), (s, true)]) {
+            let params = FitParams { spacing: spacing * 256, smoothing, end_weight };
+            let error = error(&wave(300, closed, 50.0, 7), closed, &params);
+            assert!(error <= 1.0, "{params:?}, closed {closed}: {error}");
         }
     }
 }
@@ -169,7 +170,7 @@ fn a_curve_stays_near_its_balls_and_reaches_its_ends() {
     let controls = fitted(&samples, false);
     let curve = Nurbs::new(&controls, false).unwrap();
     let mut row = List::<Ball, 600>::new();
-    curve.sample(256, &mut row).unwrap();
+    curve.sample(256, |ball| row.push(ball)).unwrap();
     for ends in [(samples[0].ball, row[0]), (samples[299].ball, row[row.len() - 1])] {
         assert!((ends.0.u - ends.1.u).abs() < 128 && (ends.0.v - ends.1.v).abs() < 128, "{ends:?}");
     }
@@ -189,7 +190,7 @@ fn sampling_is_even() {
         let curve = Nurbs::new(&controls, closed).unwrap();
         for step in [256, 1024, 2048] {
             let mut row = List::<Ball, 600>::new();
-            curve.sample(step, &mut row).unwrap();
+            curve.sample(step, |ball| row.push(ball)).unwrap();
             let gaps = row.windows(2).map(|p| f64::from(p[0].u - p[1].u).hypot(f64::from(p[0].v - p[1].v)));
             let gaps: Vec<f64> = gaps.collect();
             let (least, most) = gaps.iter().fold((f64::MAX, 0.0_f64), |(a, b), &g| (a.min(g), b.max(g)));
@@ -208,7 +209,7 @@ fn short_edges() {
         let one = fitted(&[at(9, 300)], closed);
         assert!(one.len() == 4 && one.iter().all(|c| c.ball == at(9, 300).ball && c.weight == ONE));
         let mut row = List::<Ball, 4>::new();
-        Nurbs::new(&one, closed).unwrap().sample(256, &mut row).unwrap();
+        Nurbs::new(&one, closed).unwrap().sample(256, |ball| row.push(ball)).unwrap();
         assert_eq!(row[..], [at(9, 300).ball]);
     }
     let two = fitted(&[at(3, 300), at(6, 600)], false);
@@ -226,13 +227,15 @@ fn radii_are_floored_and_lent_memory_is_respected() {
     assert_eq!(Nurbs::new(&controls, true).unwrap().evaluate(77).rho, LEAST_RADIUS);
     let samples = wave(300, false, 40.0, 1);
     let mut few = List::<Control, 5>::new();
-    let (mut entries, mut sides) = (vec![0; 70], vec![[0; 4]; 10]);
-    let mut scratch = Scratch { entries: &mut entries, sides: &mut sides };
-    let error = fit(&samples, false, &FitParams::default(), &mut scratch, &mut few).unwrap_err();
-    assert_eq!((error.what, error.limit), ("control points", 5));
-    let mut scratch = Scratch { entries: &mut [0; 27], sides: &mut sides };
-    let error = fit(&samples, false, &FitParams::default(), &mut scratch, &mut few).unwrap_err();
-    assert_eq!((error.what, error.limit), ("control points", 3));
+    for (words, what, limit) in
+        [(500, "control points", 5), (300, "entries of a fit", 120), (8, "control points of a fit", 2)]
+    {
+        let mut block = vec![7; words];
+        let scratch = Arena::new(&mut block);
+        few.clear();
+        let error = fit(&samples, false, &FitParams::default(), scratch, &mut few).unwrap_err();
+        assert_eq!((error.what, error.limit), (what, limit));
+    }
 }
 
 fn any_ball(range: i32) -> impl Strategy<Value = Ball> {
@@ -247,7 +250,7 @@ proptest! {
     fn nothing_panics_and_curves_stay_within_reason(
         range in prop_oneof![Just(3), Just(5000), Just(1 << 20)],
         raw in proptest::collection::vec((any_ball(1 << 20), any::<i32>(), 0..4usize), 0..40),
-        closed: bool, capacity in 4usize..80, spacing: i32, smoothing: i32, end_weight: i32, t: i32,
+        closed: bool, spacing: i32, smoothing: i32, end_weight: i32, t: i32,
     ) {
         let mut samples = Vec::new();
         for (ball, weight, copies) in raw {
@@ -255,14 +258,14 @@ proptest! {
             samples.extend(std::iter::repeat_n(Sample { ball, weight }, copies));
         }
         for params in [FitParams::default(), FitParams { spacing, smoothing, end_weight }] {
-            let controls = fitted_within(&samples, closed, &params, capacity);
+            let controls = fitted_by(&samples, closed, &params);
             prop_assert_eq!(controls.is_empty(), samples.is_empty());
             // A cubic fit overshoots its balls, but not by more than the range a few times over.
             prop_assert!(controls.iter().all(|c| c.ball.u.abs() < 1 << 23), "{:?}", controls);
             if let Some(curve) = Nurbs::new(&controls, closed) {
                 curve.evaluate(t);
                 let mut row = List::<Ball, 64>::new();
-                let _full_is_fine = curve.sample(t, &mut row);
+                let _full_is_fine = curve.sample(t, |ball| row.push(ball));
             }
         }
     }
@@ -284,7 +287,7 @@ proptest! {
         let samples: Vec<Sample> =
             raw.into_iter().map(|(ball, weight)| Sample { ball: bounded(ball), weight }).collect();
         prop_assume!(length(&samples, closed) > 4.0 * 256.0);
-        let error = error(&samples, closed, &FitParams::default(), 60);
+        let error = error(&samples, closed, &FitParams::default());
         prop_assert!(error <= 1.0, "{}", error);
     }
 

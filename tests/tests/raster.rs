@@ -3,7 +3,8 @@
 
 use heapless::Vec as List;
 use oracle::raster::{self as naive, Image, Random};
-use shared::bitmap::{Bitmap, Grey, Plane, Size};
+use shared::arena::{Arena, words};
+use shared::bitmap::{Bitmap, Grey, Plane, Size, Word};
 use shared::limits::CapacityError;
 use shared::point::{PixelPoint, orient};
 use shared::stage::binarise::{self, Polarity, Threshold, Tone};
@@ -68,12 +69,14 @@ fn thin(image: &Image, rule: Rule) -> (Image, Report) {
     let size = naive::size(image);
     let mut data = vec![u16::MAX; size.pixels()];
     let mut parabolas = vec![Parabola::default(); distance::scratch_parabolas(size.width)];
-    let mut lines = vec![0x55; thinning::scratch_words(size)];
     on_bitmap(image, |bitmap| {
         let plane = distance::distance(bitmap, &mut data, &mut parabolas).unwrap();
         let largest = (0..size.height).flat_map(|v| plane.row(v)).copied().max().unwrap_or(0);
-        let mut order = vec![7; thinning::scratch_order(bitmap.count(), largest)];
-        thinning::thin(bitmap, rule, &plane, &mut lines, &mut order).unwrap()
+        let mut block = match rule {
+            Rule::EdtOrdered => vec![7; words::<u32>(thinning::scratch_order(bitmap.count(), largest))],
+            _ => vec![7; words::<Word>(thinning::scratch_words(size))],
+        };
+        thinning::thin(bitmap, rule, &plane, Arena::new(&mut block)).unwrap()
     })
 }
 
@@ -398,17 +401,17 @@ fn too_little_memory_is_an_error() {
         refused(distance::squared_distances(b, &mut data, &mut parabolas, &mut row, |_, _| ()));
         refused(boundary::boundary(b, Element::Square, &mut [0; 3]).map(drop));
         refused(hull::convex_hull(hull::bitmap_extents(b), &mut List::<_, 5>::new()));
-        let mut lines = vec![0; thinning::scratch_words(size) - 1];
+        let mut block = vec![0; words::<Word>(thinning::scratch_words(size)) - 1];
         let plane = distance::distance(b, &mut data, &mut parabolas).unwrap();
         for rule in RULES {
-            refused(thinning::thin(b, rule, &plane, &mut lines, &mut [0; 9]).map(drop));
+            refused(thinning::thin(b, rule, &plane, Arena::new(&mut block)).map(drop));
         }
     });
     on_bitmap(&image, |b| {
         // Distances of another size read as 0 outside: a worse order, no panic.
         let plane = Plane::over(Size::new(7, 3).unwrap(), &mut data).unwrap();
-        let mut order = vec![0; thinning::scratch_order(b.count(), u16::MAX)];
-        thinning::thin(b, Rule::EdtOrdered, &plane, &mut [], &mut order).unwrap();
+        let mut block = vec![0; words::<u32>(thinning::scratch_order(b.count(), u16::MAX))];
+        thinning::thin(b, Rule::EdtOrdered, &plane, Arena::new(&mut block)).unwrap();
     });
     let grey = Grey::new(size, size.width, &[0; 4800]).unwrap();
     refused(binarise::median(grey, &mut [0; 4799]).map(drop));

@@ -5,18 +5,14 @@
 #[cfg(target_os = "none")]
 mod board {
     use cortex_m::singleton;
-    use firmware::memory::{HEIGHT, Storage, WIDTH};
-    use firmware::selftest::{DISPARITY, draw_ring, run};
+    use firmware::memory::Qvga;
+    use firmware::selftest::run;
     use panic_halt as _;
 
     #[cortex_m_rt::entry]
     fn main() -> ! {
-        let left = singleton!(: [u8; WIDTH * HEIGHT] = [0; WIDTH * HEIGHT]).expect("taken once");
-        let right = singleton!(: [u8; WIDTH * HEIGHT] = [0; WIDTH * HEIGHT]).expect("taken once");
-        let storage = singleton!(: Storage = Storage::new()).expect("taken once");
-        draw_ring(90, left);
-        draw_ring(90 - DISPARITY, right);
-        let disparity = run(storage, left, right).expect("the ring is found");
+        let storage = singleton!(: Qvga = Qvga::new()).expect("taken once");
+        let disparity = run(storage).expect("the ring is found");
         core::hint::black_box(disparity);
         loop {
             cortex_m::asm::bkpt();

@@ -12,10 +12,10 @@ use super::rectify::RectifiedCamera;
 use super::solid::Chain;
 use nalgebra::Vector2;
 use shared::fixed::PX;
-use shared::limits::CapacityError;
 use shared::pipeline::Branch;
 use shared::stage::branch;
 use shared::stage::nurbs::Control;
+use std::convert::Infallible;
 
 /// Arc between balls, px.
 const STEP: i32 = 2;
@@ -23,25 +23,22 @@ const STEP: i32 = 2;
 const APART: f64 = 0.3;
 /// Least trust in a ball's depth.
 const LEAST_WEIGHT: f64 = 0.25;
-/// Balls on one curve at most.
-const BALLS: usize = 1 << 13;
 
 /// The balls of all curves and the chain of each.
-///
-/// # Errors
-/// A [`CapacityError`] for a curve of more than 16,000 px.
 pub fn curve_balls(
     camera: &RectifiedCamera,
     edges: &[Edge],
     branches: &[Branch],
     controls: &[Control],
-) -> Result<(Vec<Ball>, Vec<Chain>), CapacityError> {
-    let mut points: Box<heapless::Vec<branch::Ball, BALLS>> = Box::default();
+) -> (Vec<Ball>, Vec<Chain>) {
     let (mut balls, mut chains) = (Vec::new(), Vec::new());
     for branch in branches {
         let Some(curve) = branch.curve(controls) else { continue };
-        points.clear();
-        curve.sample(STEP * PX, &mut *points)?;
+        let mut points: Vec<branch::Ball> = Vec::new();
+        let Ok(()) = curve.sample::<Infallible>(STEP * PX, |ball| {
+            points.push(ball);
+            Ok(())
+        });
         let start = balls.len();
         chains.push(Chain { start, len: points.len(), closed: branch.closed });
         for (k, point) in points.iter().enumerate() {
@@ -59,7 +56,7 @@ pub fn curve_balls(
             });
         }
     }
-    Ok((balls, chains))
+    (balls, chains)
 }
 
 /// The contour points that a ball about `at` touches; the nearest twice if there is no other side.

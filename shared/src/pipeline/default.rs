@@ -2,7 +2,8 @@
 
 use super::eye::{add_branch, each_branch, fit_curves};
 use super::finding::{Gates, MAX_RESIDUAL, MIN_DISPARITY, UNMATCHED_WARNS};
-use super::{Finding, Memory, Observer, Product, Settings, Side};
+use super::{EyeMemory, Finding, Memory, Observer, Product, Settings, Side};
+use crate::arena::Arena;
 use crate::bitmap::Size;
 use crate::fixed::{ONE, PX, UNIT, div_round};
 use crate::limits::CapacityError;
@@ -14,7 +15,7 @@ use crate::stage::depth::ball_depths;
 use crate::stage::hull::{RowExtent, convex_hull};
 use crate::stage::medial::medial_balls;
 use crate::stage::plane::{ImagePlane, Observation};
-use crate::stage::rows::{RowCrossing, Rows, match_rows, row_crossings};
+use crate::stage::rows::{RowCrossing, Rows, count_crossings, match_rows, row_crossings};
 
 /// The default way from two contours to the depth of every ball and curve.
 pub(super) fn match_views(
@@ -26,16 +27,19 @@ pub(super) fn match_views(
 ) -> Result<(), Finding> {
     let [left, right] = &mut memory.eyes;
     let offset = gates.outcome.vertical_offset;
-    for (eye, side, offset) in [(&mut *left, Side::Left, 0), (&mut *right, Side::Right, offset)] {
-        let limit = eye.rows.len();
-        let first = eye.rows.get_mut(..=size.height).ok_or(CapacityError { what: "ends of rows", limit })?;
-        row_crossings(eye.contour, eye.loops, offset, first, eye.crossings)?;
-        let rows = Rows { first, crossings: eye.crossings };
+    let mut scratch = Arena::new(memory.scratch);
+    let mut passing = scratch.fork();
+    let mut see = |eye: &mut EyeMemory<'_>, side, offset| {
+        let first = passing.take(size.height + 1, "ends of rows")?;
+        let crossings =
+            passing.take(count_crossings(eye.contour, eye.loops, offset, size.height), "row crossings")?;
+        let rows = row_crossings(eye.contour, eye.loops, offset, first, crossings);
         convex_hull(contour_extents(eye.contour, rows, offset), eye.hull)?;
         observer.saw(Some(side), Product::Hull(eye.hull));
-    }
-    let left_rows = Rows { first: &left.rows[..=size.height], crossings: left.crossings };
-    let right_rows = Rows { first: &right.rows[..=size.height], crossings: right.crossings };
+        Ok::<_, CapacityError>(rows)
+    };
+    let left_rows = see(left, Side::Left, 0)?;
+    let right_rows = see(right, Side::Right, offset)?;
 
     let plane = seed((left.hull, right.hull), (left_rows, right_rows), size.width, gates, observer)?;
     let least = left.hull.iter().map(|p| plane.at(*p)).min().unwrap_or(plane.level);
@@ -49,7 +53,7 @@ pub(super) fn match_views(
         (left_rows, right_rows),
         &plane,
         memory.matches,
-        memory.scratch.trusted,
+        passing,
     )?;
     gates.outcome.rows = statistics;
     observer.saw(None, Product::Rows(memory.matches, statistics));
@@ -70,7 +74,7 @@ pub(super) fn match_views(
         trace_branch(path, free, balls, left.samples)?;
         add_branch(left.branches, left.samples, start, nodes, closed)
     })?;
-    fit_curves(left, &mut memory.scratch, &settings.curves)?;
+    fit_curves(left, scratch, &settings.curves)?;
     observer.saw(None, Product::Curves(left.branches, left.controls));
     Ok(())
 }

@@ -1,8 +1,9 @@
-//! One eye: from its picture to contour, pruned skeleton and, the paper's way, its curves.
+//! One eye, in two steps: from its picture to mask and contour, from the mask to its pruned skeleton.
 
 use super::finding::{Gates, MAX_COVER, MIN_AREA, MIN_CONTRAST, MIN_HEIGHT, SECOND_COVER};
-use super::{Branch, EyeMemory, Finding, Method, Observer, Product, Scratch, Settings, Side};
-use crate::bitmap::{Bitmap, Grey, PixelBox, Word};
+use super::{Branch, EyeMemory, Finding, Method, Observer, Product, Settings, Side};
+use crate::arena::Arena;
+use crate::bitmap::{Bitmap, Grey, PixelBox, Size, Word};
 use crate::fixed::{ONE, PX};
 use crate::limits::{CapacityError, push};
 use crate::point::Pixel;
@@ -11,40 +12,45 @@ use crate::stage::boundary::{Element, boundary};
 use crate::stage::branch::{Sample, trace_pixels};
 use crate::stage::clean;
 use crate::stage::contour::{ContourPoint, contour, frontier};
-use crate::stage::distance;
+use crate::stage::distance::{self, scratch_parabolas};
 use crate::stage::graph::{Graph, NodeKind};
 use crate::stage::nurbs::{self, FitParams};
 use crate::stage::prune;
 use crate::stage::thinning;
 use heapless::VecView;
 
+/// What scratch for bitmaps is called when it runs out.
+const WORDS: &str = "words of scratch";
+
 /// What one eye's picture gives beside its lists.
+#[derive(Clone, Copy)]
 pub(super) struct EyeFigures {
+    pub(super) size: Size,
     pub(super) area: u32,
     pub(super) top: ContourPoint,
     pub(super) bottom: ContourPoint,
 }
 
-/// One eye: from its picture to contour and pruned skeleton.
-pub(super) fn see(
+/// From the picture to the mask and the contour of its object.
+pub(super) fn outline(
     side: Side,
     grey: Grey<'_>,
     eye: &mut EyeMemory<'_>,
-    scratch: &mut Scratch<'_>,
+    mut scratch: Arena<'_>,
     settings: &Settings,
     gates: &mut Gates,
     observer: &mut impl Observer,
 ) -> Result<EyeFigures, Finding> {
     let size = grey.size();
     let mut saw = |product: Product<'_>| observer.saw(Some(side), product);
+    let filtered = filtered(size, settings, &mut scratch)?;
     let (grey, mask) =
-        silhouette(side, grey, (eye.mask, scratch.grey, scratch.words), settings, gates, &mut saw)?;
+        silhouette(side, grey, (eye.mask, filtered, scratch.fork()), settings, gates, &mut saw)?;
     let area = mask.count() as u32;
 
-    let (seen, _) = scratch.words.split_at_mut(size.words().min(scratch.words.len()));
-    saw(Product::Boundary(&boundary(&mask, Element::Square, seen)?));
+    saw(Product::Boundary(&boundary(&mask, Element::Square, scratch.fork().take(size.words(), WORDS)?)?));
     let edges = settings.sub_pixel.then_some(grey);
-    contour(edges, &mask, &mut Bitmap::new(size, seen)?, scratch.edges, eye.contour, eye.loops)?;
+    contour(edges, &mask, scratch, eye.contour, eye.loops)?;
     saw(Product::Contour(eye.contour, eye.loops));
     if eye.contour.iter().any(|p| p.border) {
         gates.meet(Finding::TouchesBorder(side))?;
@@ -54,21 +60,42 @@ pub(super) fn see(
     if height < MIN_HEIGHT {
         gates.meet(Finding::TooLow(side, height))?;
     }
+    Ok(EyeFigures { size, area, top, bottom })
+}
 
-    let plane = distance::distance(&mask, scratch.plane, scratch.parabolas)?;
-    saw(Product::Distance(&plane));
-    let mut skeleton = Bitmap::new(size, eye.skeleton)?;
-    skeleton.copy_from(&mask);
-    let thinned = thinning::thin(&mut skeleton, settings.thinning, &plane, scratch.words, scratch.order)?;
-    thinning::minimal(&mut skeleton);
-    saw(Product::Skeleton(&skeleton, thinned));
-    if skeleton.count() == 0 {
-        gates.meet(Finding::SkeletonErased(side))?;
-    }
-    let pruned =
-        prune::prune(&mut skeleton, &plane, settings.pruning, scratch.words, scratch.tips, &mut eye.graph)?;
-    saw(Product::Graph(&skeleton, &eye.graph, pruned));
-    if matches!(settings.method, Method::Paper(_)) {
+/// From the mask to the graph of its pruned skeleton and, the paper's way, its curves.
+pub(super) fn skeleton(
+    (side, size): (Side, Size),
+    eye: &mut EyeMemory<'_>,
+    mut scratch: Arena<'_>,
+    settings: &Settings,
+    gates: &mut Gates,
+    observer: &mut impl Observer,
+) -> Result<(), Finding> {
+    let mut saw = |product: Product<'_>| observer.saw(Some(side), product);
+    let mask = Bitmap::over(size, eye.mask)?;
+    {
+        let mut scratch = scratch.fork();
+        let mut skeleton = Bitmap::new(size, scratch.take(size.words(), WORDS)?)?;
+        let plane = {
+            let plane = scratch.take(size.pixels(), "pixels in a plane")?;
+            let mut passing = scratch.fork();
+            let parabolas = passing.take(scratch_parabolas(size.width), "parabolas of scratch")?;
+            distance::distance(&mask, plane, parabolas)?
+        };
+        saw(Product::Distance(&plane));
+        skeleton.copy_from(&mask);
+        let thinned = thinning::thin(&mut skeleton, settings.thinning, &plane, scratch.fork())?;
+        thinning::minimal(&mut skeleton);
+        saw(Product::Skeleton(&skeleton, thinned));
+        if skeleton.count() == 0 {
+            gates.meet(Finding::SkeletonErased(side))?;
+        }
+        let pruned = prune::prune(&mut skeleton, &plane, settings.pruning, scratch, &mut eye.graph)?;
+        saw(Product::Graph(&skeleton, &eye.graph, pruned));
+        if matches!(settings.method, Method::Default) {
+            return Ok(());
+        }
         // The paper describes the skeletons of both views before it matches them.
         eye.samples.clear();
         eye.branches.clear();
@@ -77,26 +104,34 @@ pub(super) fn see(
             trace_pixels(path, &plane, eye.samples)?;
             add_branch(eye.branches, eye.samples, start, nodes, closed)
         })?;
-        fit_curves(eye, scratch, &settings.curves)?;
-        follow_curves(eye, scratch)?;
-        saw(Product::Curves(eye.branches, eye.controls));
     }
-    Ok(EyeFigures { area, top, bottom })
+    fit_curves(eye, scratch, &settings.curves)?;
+    follow_curves(eye)?;
+    saw(Product::Curves(eye.branches, eye.controls));
+    Ok(())
+}
+
+/// Memory for the filtered picture, if there is to be one.
+fn filtered<'a>(
+    size: Size,
+    settings: &Settings,
+    scratch: &mut Arena<'a>,
+) -> Result<&'a mut [u8], CapacityError> {
+    scratch.take(if settings.median { size.pixels() } else { 0 }, "pixels in a picture")
 }
 
 /// The filtered picture and the cleaned mask of its largest object.
-///
-/// The lent memory: the mask's words, the filtered picture's bytes, twice the mask's words of scratch.
 fn silhouette<'a>(
     side: Side,
     grey: Grey<'a>,
-    (mask, smooth, scratch): (&'a mut [Word], &'a mut [u8], &mut [Word]),
+    (mask, filtered, mut scratch): (&'a mut [Word], &'a mut [u8], Arena<'_>),
     settings: &Settings,
     gates: &mut Gates,
     saw: &mut impl FnMut(Product<'_>),
 ) -> Result<(Grey<'a>, Bitmap<'a>), Finding> {
-    let pixels = grey.size().pixels() as u32;
-    let grey = if settings.median { binarise::median(grey, smooth)? } else { grey };
+    let size = grey.size();
+    let pixels = size.pixels() as u32;
+    let grey = if settings.median { binarise::median(grey, filtered)? } else { grey };
     let histogram = binarise::histogram(grey);
     let level = settings.threshold.level(&histogram);
     let tone = settings.polarity.tone(grey, level);
@@ -106,8 +141,9 @@ fn silhouette<'a>(
     }
 
     let mut mask = binarise::binarise(grey, level, tone, mask)?;
-    let components = clean::keep_largest(&mut mask, scratch)?;
-    clean::fill_holes(&mut mask, clean::HOLE_AREA, scratch)?;
+    let words = scratch.take(clean::scratch_words(size), WORDS)?;
+    let components = clean::keep_largest(&mut mask, words)?;
+    clean::fill_holes(&mut mask, clean::HOLE_AREA, words)?;
     let area = mask.count() as u32;
     saw(Product::Mask(&mask, components));
     if area < MIN_AREA {
@@ -124,18 +160,19 @@ fn silhouette<'a>(
 }
 
 /// The box of the object in a picture, found and judged as a run would: what a rectification is laid
-/// around. The lent memory is that of a mask, a filtered picture, and twice a mask.
+/// around. The lent memory is that of a mask, and scratch for a filtered picture and two masks.
 ///
 /// # Errors
 /// The first [`Finding`] that refuses.
 pub fn object_box(
     side: Side,
     grey: Grey<'_>,
-    (mask, smooth, scratch): (&mut [Word], &mut [u8], &mut [Word]),
+    (mask, scratch): (&mut [Word], &mut [u64]),
     settings: &Settings,
 ) -> Result<PixelBox, Finding> {
-    let mut gates = Gates::new(settings);
-    let (_, mask) = silhouette(side, grey, (mask, smooth, scratch), settings, &mut gates, &mut |_| ())?;
+    let (mut gates, mut scratch) = (Gates::new(settings), Arena::new(scratch));
+    let filtered = filtered(grey.size(), settings, &mut scratch)?;
+    let (_, mask) = silhouette(side, grey, (mask, filtered, scratch), settings, &mut gates, &mut |_| ())?;
     mask.bounds().ok_or(Finding::NoObject(side, 0))
 }
 
@@ -188,32 +225,27 @@ pub(super) fn add_branch(
 /// Fit a curve to each branch.
 pub(super) fn fit_curves(
     eye: &mut EyeMemory<'_>,
-    scratch: &mut Scratch<'_>,
+    mut scratch: Arena<'_>,
     params: &FitParams,
 ) -> Result<(), CapacityError> {
     eye.controls.clear();
     for branch in eye.branches.iter_mut() {
         branch.controls = eye.controls.len();
         let samples = &eye.samples[branch.samples..branch.samples + branch.sample_count];
-        let mut lent = nurbs::Scratch { entries: scratch.entries, sides: scratch.sides };
-        branch.control_count = nurbs::fit(samples, branch.closed, params, &mut lent, eye.controls)?;
+        branch.control_count = nurbs::fit(samples, branch.closed, params, scratch.fork(), eye.controls)?;
     }
     Ok(())
 }
 
 /// Replace the samples by points of the fitted curves, a pixel apart.
-fn follow_curves(eye: &mut EyeMemory<'_>, scratch: &mut Scratch<'_>) -> Result<(), CapacityError> {
+fn follow_curves(eye: &mut EyeMemory<'_>) -> Result<(), CapacityError> {
     eye.samples.clear();
     for branch in eye.branches.iter_mut() {
-        scratch.points.clear();
-        if let Some(curve) = branch.curve(eye.controls) {
-            curve.sample(PX, scratch.points)?;
-        }
         branch.samples = eye.samples.len();
-        branch.sample_count = scratch.points.len();
-        for &ball in scratch.points.iter() {
-            push(eye.samples, Sample { ball, weight: ONE }, "branch samples")?;
+        if let Some(curve) = branch.curve(eye.controls) {
+            curve.sample(PX, |ball| push(eye.samples, Sample { ball, weight: ONE }, "branch samples"))?;
         }
+        branch.sample_count = eye.samples.len() - branch.samples;
     }
     Ok(())
 }

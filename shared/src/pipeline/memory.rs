@@ -1,11 +1,12 @@
 //! What a run borrows: memory of any size, named once.
 
-use crate::bitmap::Word;
+use crate::arena;
+use crate::bitmap::{Size, Word};
 use crate::point::PixelPoint;
-use crate::stage::branch::{Ball, Sample};
+use crate::stage::branch::Sample;
 use crate::stage::contour::{ContourLoop, ContourPoint, EdgeCrossing};
 use crate::stage::depth::BallDepth;
-use crate::stage::distance::Parabola;
+use crate::stage::distance::{Parabola, scratch_parabolas};
 use crate::stage::graph::Graph;
 use crate::stage::medial::MedialBall;
 use crate::stage::nearest::Pair;
@@ -40,20 +41,14 @@ impl Branch {
 
 /// Memory of one eye; the lists hold the result afterwards.
 pub struct EyeMemory<'a> {
-    /// [`Size::words`](crate::bitmap::Size::words) for the mask.
+    /// The mask: [`Size::words`].
     pub mask: &'a mut [Word],
-    /// [`Size::words`](crate::bitmap::Size::words) for the skeleton.
-    pub skeleton: &'a mut [Word],
     /// The contour, about one entry a pixel of arc.
     pub contour: &'a mut VecView<ContourPoint>,
     /// Its loops.
     pub loops: &'a mut VecView<ContourLoop>,
     /// Vertices of the convex hull.
     pub hull: &'a mut VecView<PixelPoint>,
-    /// Where the contour crosses rows: about one entry a row for each of its sides.
-    pub crossings: &'a mut VecView<RowCrossing>,
-    /// One entry more than rows.
-    pub rows: &'a mut [u32],
     /// The skeleton's graph.
     pub graph: Graph<'a>,
     /// Samples of its branches.
@@ -64,38 +59,10 @@ pub struct EyeMemory<'a> {
     pub controls: &'a mut VecView<Control>,
 }
 
-/// Memory that holds nothing of interest afterwards.
-pub struct Scratch<'a> {
-    /// [`Size::pixels`](crate::bitmap::Size::pixels) for the filtered image.
-    pub grey: &'a mut [u8],
-    /// Twice [`Size::words`](crate::bitmap::Size::words).
-    pub words: &'a mut [Word],
-    /// [`Size::pixels`](crate::bitmap::Size::pixels) for distances.
-    pub plane: &'a mut [u16],
-    /// [`scratch_parabolas`](crate::stage::distance::scratch_parabolas).
-    pub parabolas: &'a mut [Parabola],
-    /// [`scratch_order`](crate::stage::thinning::scratch_order).
-    pub order: &'a mut [u32],
-    /// Cracks of the longest contour loop.
-    pub edges: &'a mut VecView<EdgeCrossing>,
-    /// Ends of the skeleton.
-    pub tips: &'a mut VecView<Tip>,
-    /// As many as contour points.
-    pub trusted: &'a mut VecView<Trusted>,
-    /// Points along the longest curve.
-    pub points: &'a mut VecView<Ball>,
-    /// Seven a control point of the longest curve.
-    pub entries: &'a mut [i64],
-    /// One a control point of the longest curve.
-    pub sides: &'a mut [[i64; 4]],
-}
-
 /// All memory of the pipeline.
 pub struct Memory<'a> {
     /// Left and right eye.
     pub eyes: [EyeMemory<'a>; 2],
-    /// What passes.
-    pub scratch: Scratch<'a>,
     /// One a left contour point.
     pub matches: &'a mut VecView<ContourMatch>,
     /// At most one a left contour point.
@@ -106,6 +73,34 @@ pub struct Memory<'a> {
     pub boundary_pairs: &'a mut VecView<Pair>,
     /// The paper's pairs of skeleton points; may be without capacity otherwise.
     pub skeleton_pairs: &'a mut VecView<Pair>,
+    /// What passes: [`scratch_words`].
+    pub scratch: &'a mut [u64],
+}
+
+/// Words of scratch that pictures of a size need, if a contour has up to `points` points and a curve up to
+/// `controls` control points. `order` is [`scratch_order`](crate::stage::thinning::scratch_order) where
+/// thinning keeps to the distance, or 0.
+pub const fn scratch_words(size: Size, points: usize, controls: usize, order: usize) -> usize {
+    let bitmap = arena::words::<Word>(size.words());
+    let distance = arena::words::<u16>(size.pixels()) + bitmap;
+    let thinning = arena::words::<Parabola>(scratch_parabolas(size.width)) + arena::words::<u32>(order);
+    let pruning = bitmap + arena::words::<Tip>(points / 8);
+    let skeleton = distance + max(max(thinning, 2 * arena::words::<Word>(size.row_words())), pruning);
+    let rows = 2 * (arena::words::<u32>(size.height + 1) + arena::words::<RowCrossing>(points));
+    let pair = rows + arena::words::<Trusted>(points);
+    max(max(outline_words(size, points), skeleton), max(pair, (7 + 4) * controls))
+}
+
+/// The part of them that [`Run::outline`](super::Run::outline) needs.
+pub const fn outline_words(size: Size, points: usize) -> usize {
+    let bitmap = arena::words::<Word>(size.words());
+    // A loop has up to sqrt 2 cracks a point, the staircase of a diagonal.
+    let cracks = arena::words::<EdgeCrossing>(points * 3 / 2);
+    arena::words::<u8>(size.pixels()) + max(2 * bitmap, bitmap + cracks)
+}
+
+const fn max(a: usize, b: usize) -> usize {
+    if a > b { a } else { b }
 }
 
 impl Memory<'_> {
@@ -115,7 +110,6 @@ impl Memory<'_> {
             eye.contour.clear();
             eye.loops.clear();
             eye.hull.clear();
-            eye.crossings.clear();
             eye.graph.clear();
             eye.samples.clear();
             eye.branches.clear();

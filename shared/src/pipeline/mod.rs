@@ -23,10 +23,11 @@ mod paper;
 
 pub use eye::object_box;
 pub use finding::{Finding, MAX_COVER};
-pub use memory::{Branch, EyeMemory, Memory, Scratch};
+pub use memory::{Branch, EyeMemory, Memory, outline_words, scratch_words};
 pub use observer::{Observer, Product};
 pub use paper::PAPER_VERTICES;
 
+use crate::arena::Arena;
 use crate::bitmap::{Grey, Size};
 use crate::fixed::{ONE, PX, div_round, saturate};
 use crate::limits::MAX_SIDE;
@@ -39,7 +40,7 @@ use crate::stage::plane::ImagePlane;
 use crate::stage::prune::Pruning;
 use crate::stage::rows::RowStatistics;
 use crate::stage::thinning::Rule;
-use eye::{EyeFigures, see};
+use eye::EyeFigures;
 use finding::{AREA_RATIO, Gates, MAX_OFFSET, MAX_TILT, MIN_OFFSET, NOTED_OFFSET};
 use heapless::Vec;
 
@@ -100,6 +101,12 @@ impl Settings {
         }
     }
 
+    /// What a small device does: contours of the mask alone, and a thinning rule that needs no order of the
+    /// pixels, so that a block of scratch of twice the picture is enough.
+    pub fn device(optics: Optics) -> Self {
+        Self { sub_pixel: false, thinning: Rule::HitOrMiss, ..Self::new(optics) }
+    }
+
     /// As literally as the paper's prose allows; branches shorter than 10 px are pruned.
     pub fn paper(optics: Optics, matching: PaperMatching) -> Self {
         Self {
@@ -147,24 +154,86 @@ pub fn run(
     settings: &Settings,
     observer: &mut impl Observer,
 ) -> Result<Outcome, Finding> {
-    let mut gates = Gates::new(settings);
+    let mut run = Run::new(memory, settings);
     if left.size() != right.size() {
         let pair = |s: Size| (s.width, s.height);
-        gates.meet(Finding::SizesDiffer { left: pair(left.size()), right: pair(right.size()) })?;
+        run.gates.meet(Finding::SizesDiffer { left: pair(left.size()), right: pair(right.size()) })?;
     }
-    memory.clear();
-    let [left_eye, right_eye] = &mut memory.eyes;
-    let scratch = &mut memory.scratch;
-    let figures = [
-        see(Side::Left, left, left_eye, scratch, settings, &mut gates, observer)?,
-        see(Side::Right, right, right_eye, scratch, settings, &mut gates, observer)?,
-    ];
-    compare(&figures, &mut gates)?;
-    match settings.method {
-        Method::Default => default::match_views(memory, left.size(), settings, &mut gates, observer)?,
-        Method::Paper(paper) => paper::match_as_paper(memory, left.size(), paper, &mut gates, observer)?,
+    let mut see = |side: Side, grey| {
+        let eye = &mut memory.eyes[side as usize];
+        run.outline(side, grey, eye, Arena::new(memory.scratch), observer)?;
+        run.skeleton(side, eye, Arena::new(memory.scratch), observer)
+    };
+    see(Side::Left, left)?;
+    see(Side::Right, right)?;
+    run.pair(memory, observer)
+}
+
+/// A run in its steps, for a device that has room for but one picture at a time: outline and skeleton of
+/// the left eye, then of the right one, then the pair.
+pub struct Run<'s> {
+    settings: &'s Settings,
+    gates: Gates,
+    figures: [Option<EyeFigures>; 2],
+}
+
+impl<'s> Run<'s> {
+    /// A new run, which forgets what an earlier one left in the memory.
+    pub fn new(memory: &mut Memory<'_>, settings: &'s Settings) -> Self {
+        memory.clear();
+        Self { settings, gates: Gates::new(settings), figures: [None; 2] }
     }
-    Ok(gates.outcome)
+
+    /// From an eye's picture to mask and contour. The picture is not needed any more after this.
+    ///
+    /// # Errors
+    /// The first [`Finding`] that refuses.
+    pub fn outline(
+        &mut self,
+        side: Side,
+        grey: Grey<'_>,
+        eye: &mut EyeMemory<'_>,
+        scratch: Arena<'_>,
+        observer: &mut impl Observer,
+    ) -> Result<(), Finding> {
+        let figures = eye::outline(side, grey, eye, scratch, self.settings, &mut self.gates, observer)?;
+        self.figures[side as usize] = Some(figures);
+        Ok(())
+    }
+
+    /// From an eye's mask to its skeleton. The right eye's is but looked at, unless the method is the
+    /// paper's: without it the same comes out.
+    ///
+    /// # Errors
+    /// The first [`Finding`] that refuses.
+    pub fn skeleton(
+        &mut self,
+        side: Side,
+        eye: &mut EyeMemory<'_>,
+        scratch: Arena<'_>,
+        observer: &mut impl Observer,
+    ) -> Result<(), Finding> {
+        let figures = self.figures[side as usize].ok_or(Finding::NoObject(side, 0))?;
+        eye::skeleton((side, figures.size), eye, scratch, self.settings, &mut self.gates, observer)
+    }
+
+    /// From both eyes to the described pair.
+    ///
+    /// # Errors
+    /// The first [`Finding`] that refuses.
+    pub fn pair(mut self, memory: &mut Memory<'_>, observer: &mut impl Observer) -> Result<Outcome, Finding> {
+        let [Some(left), Some(right)] = self.figures else {
+            let side = if self.figures[0].is_none() { Side::Left } else { Side::Right };
+            return Err(Finding::NoObject(side, 0));
+        };
+        compare(&[left, right], &mut self.gates)?;
+        let (settings, gates) = (self.settings, &mut self.gates);
+        match settings.method {
+            Method::Default => default::match_views(memory, left.size, settings, gates, observer)?,
+            Method::Paper(paper) => paper::match_as_paper(memory, left.size, paper, gates, observer)?,
+        }
+        Ok(self.gates.outcome)
+    }
 }
 
 /// Gates that look at both views; notes the vertical offset.

@@ -2,7 +2,8 @@
 
 use super::finding::Gates;
 use super::{Finding, Memory, Observer, Product, Side};
-use crate::bitmap::{Bitmap, Size};
+use crate::arena::Arena;
+use crate::bitmap::{Bitmap, Size, Word};
 use crate::point::Pixel;
 use crate::stage::boundary::{Element, boundary};
 use crate::stage::branch::Sample;
@@ -32,12 +33,12 @@ pub(super) fn match_as_paper(
     observer.saw(None, Product::Vertices(&matched));
     gates.outcome.vertices = Some(matched);
 
-    let words = size.words().min(memory.scratch.words.len());
-    let (a, b) = memory.scratch.words.split_at_mut(words);
-    let boundaries = [
-        boundary(&Bitmap::over(size, left.mask)?, Element::Square, a)?,
-        boundary(&Bitmap::over(size, right.mask)?, Element::Square, b)?,
-    ];
+    let mut scratch = Arena::new(memory.scratch);
+    let mut edge = |mask: &mut [Word]| {
+        let words = scratch.take(size.words(), "words of scratch")?;
+        boundary(&Bitmap::over(size, mask)?, Element::Square, words)
+    };
+    let boundaries = [edge(left.mask)?, edge(right.mask)?];
     let points = |i: usize| boundaries[i].pixels().map(Pixel::centre);
     pair_nearest(points(0), || points(1), &matched.map, memory.boundary_pairs)?;
     let skeleton = |samples: &'_ VecView<Sample>, k: usize| samples[k].ball.at();

@@ -14,10 +14,12 @@ use crate::point::{Direction, Pixel, PixelPoint};
 use crate::stage::depth::BallDepth;
 use crate::stage::distance::DISTANCE_PX;
 use crate::stage::medial::MedialBall;
+use bytemuck::{Pod, Zeroable};
 use heapless::VecView;
 
 /// A ball of the skeleton in the left image, 1/256 px.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
 pub struct Ball {
     /// Horizontal coordinate of the centre.
     pub u: i32,

@@ -16,10 +16,12 @@
 //! * **Cost**: linear in the number of cracks.
 //! * **Not promised**: that the polygon is free of self-intersections where parts are thinner than 2 px.
 
+use crate::arena::{Arena, List};
 use crate::bitmap::{Bitmap, Grey};
 use crate::fixed::{PX, hypot};
 use crate::limits::{CapacityError, push};
 use crate::point::{Direction, PixelPoint};
+use bytemuck::{Pod, Zeroable};
 use heapless::VecView;
 
 /// A sample of the contour.
@@ -56,10 +58,12 @@ impl ContourLoop {
 }
 
 /// The crack between a set pixel and its clear neighbour, moved on to the edge.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
 pub struct EdgeCrossing {
     at: PixelPoint,
-    border: bool,
+    /// Pixels beyond, within reach: none on the image's border.
+    beyond: i32,
 }
 
 /// The four axes, clockwise on the screen, from the inner to the outer pixel of a crack.
@@ -80,21 +84,21 @@ const TANGENT: [i32; 5] = [51, 53, 26, 7, 1];
 /// Trace all loops of `mask` and sample them at about 1 px of arc. Without a grey image edges lie in the
 /// middle between pixels, softened.
 ///
-/// `seen` is a scratch bitmap of the mask's size, `crossings` scratch for the longest loop.
+/// The scratch holds as many words as the mask, and the cracks of the longest loop.
 ///
 /// # Errors
 /// A [`CapacityError`] when a list is too short; `points` and `loops` are then incomplete.
 pub fn contour(
     grey: Option<Grey<'_>>,
     mask: &Bitmap<'_>,
-    seen: &mut Bitmap<'_>,
-    crossings: &mut VecView<EdgeCrossing>,
+    mut scratch: Arena<'_>,
     points: &mut VecView<ContourPoint>,
     loops: &mut VecView<ContourLoop>,
 ) -> Result<(), CapacityError> {
     points.clear();
     loops.clear();
-    seen.clear();
+    let mut seen = Bitmap::new(mask.size(), scratch.take(mask.size().words(), "words of scratch")?)?;
+    let mut crossings = scratch.list("contour crossings");
     for v in 0..mask.size().height as i32 {
         for i in 0..mask.size().row_words() {
             // Every loop has a crack with the clear pixel to the north: start at the first not yet seen.
@@ -102,11 +106,11 @@ pub fn contour(
             for bit in crate::bitmap::SetBits(north_edges) {
                 let u = (i * crate::bitmap::WORD_BITS + bit) as i32;
                 if !seen.get(u, v) {
-                    trace(grey, mask, (u, v), seen, crossings)?;
+                    trace(grey, mask, (u, v), &mut seen, &mut crossings)?;
                     if grey.is_none() {
-                        soften(crossings);
+                        soften(&mut crossings);
                     }
-                    resample(crossings, points, loops)?;
+                    resample(&crossings, points, loops)?;
                 }
             }
         }
@@ -120,7 +124,7 @@ fn trace(
     mask: &Bitmap<'_>,
     start: (i32, i32),
     seen: &mut Bitmap<'_>,
-    crossings: &mut VecView<EdgeCrossing>,
+    crossings: &mut List<'_, EdgeCrossing>,
 ) -> Result<(), CapacityError> {
     crossings.clear();
     let (mut pixel, mut axis) = (start, 0);
@@ -128,7 +132,7 @@ fn trace(
         if axis == 0 {
             seen.put(pixel.0 as usize, pixel.1 as usize, true);
         }
-        push(crossings, place(grey, mask, pixel, AXES[axis]), "contour crossings")?;
+        crossings.push(place(grey, mask, pixel, AXES[axis]))?;
         let (outward, ahead) = (AXES[axis], AXES[(axis + 1) % 4]);
         let beside = (pixel.0 + ahead.0, pixel.1 + ahead.1);
         let diagonal = (beside.0 + outward.0, beside.1 + outward.1);
@@ -191,7 +195,7 @@ fn place(grey: Option<Grey<'_>>, mask: &Bitmap<'_>, pixel: (i32, i32), axis: (i3
     let along = PX / 2 + shift.clamp(-PX * 3 / 4, PX * 3 / 4);
     EdgeCrossing {
         at: PixelPoint { u: pixel.0 * PX + along * axis.0, v: pixel.1 * PX + along * axis.1 },
-        border: outer == 0,
+        beyond: outer,
     }
 }
 
@@ -217,7 +221,7 @@ fn resample(
             i += 1;
         }
         let at = crossings[i].at.lerp(next(i), (target - before) as i32, segment(i));
-        let point = ContourPoint { at, normal: Direction::default(), border: crossings[i].border };
+        let point = ContourPoint { at, normal: Direction::default(), border: crossings[i].beyond == 0 };
         push(points, point, "contour points")?;
     }
     for i in here.range() {
@@ -269,18 +273,16 @@ mod tests {
     #[test]
     fn a_disc_is_found_to_a_fraction_of_a_pixel() {
         let size = Size::new(64, 64).unwrap();
-        let (mut grey, mut words, mut scratch) = ([0; 64 * 64], [0 as Word; 128], [0 as Word; 128]);
+        let (mut grey, mut words, mut block) = ([0; 64 * 64], [0 as Word; 128], [0; 2048]);
         for (centre, radius, bound) in
             [((512, 512), 320, 0.02), ((519, 505), 331, 0.02), ((505, 515), 100, 0.045)]
         {
             disc(size, centre, radius, &mut grey);
             let mut mask = Bitmap::new(size, &mut words).unwrap();
             (0..64 * 64).for_each(|i| mask.put(i % 64, i / 64, grey[i] > 100));
-            let mut seen = Bitmap::new(size, &mut scratch).unwrap();
-            let (mut raw, mut points, mut loops) =
-                (Vec::<_, 1024>::new(), Vec::<_, 1024>::new(), Vec::<_, 4>::new());
+            let (mut points, mut loops) = (Vec::<_, 1024>::new(), Vec::<_, 4>::new());
             let image = Grey::new(size, 64, &grey).unwrap();
-            contour(Some(image), &mask, &mut seen, &mut raw, &mut points, &mut loops).unwrap();
+            contour(Some(image), &mask, Arena::new(&mut block), &mut points, &mut loops).unwrap();
             assert_eq!(loops.len(), 1);
             let mut square_sum = 0.0;
             for p in &points {
@@ -316,12 +318,10 @@ mod tests {
         .unwrap();
         let grey: [u8; 49] =
             core::array::from_fn(|i| if mask.get(i as i32 % 7, i as i32 / 7) { 200 } else { 10 });
-        let mut scratch = [0; 16];
-        let mut seen = Bitmap::new(mask.size(), &mut scratch).unwrap();
-        let (mut raw, mut points, mut loops) =
-            (Vec::<_, 256>::new(), Vec::<_, 256>::new(), Vec::<_, 8>::new());
+        let mut block = [0; 256];
+        let (mut points, mut loops) = (Vec::<_, 256>::new(), Vec::<_, 8>::new());
         let image = Grey::new(mask.size(), 7, &grey).unwrap();
-        contour(Some(image), &mask, &mut seen, &mut raw, &mut points, &mut loops).unwrap();
+        contour(Some(image), &mask, Arena::new(&mut block), &mut points, &mut loops).unwrap();
         assert_eq!(loops.len(), 4, "ring outside, ring inside, dot, bar");
         assert!(points.iter().any(|p| p.border) && points.iter().any(|p| !p.border));
     }

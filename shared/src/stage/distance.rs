@@ -19,12 +19,14 @@
 
 use crate::bitmap::{Bitmap, Plane, WORD_BITS};
 use crate::limits::CapacityError;
+use bytemuck::{Pod, Zeroable};
 
 /// One pixel, in the unit of stored distances: 1/16 px.
 pub const DISTANCE_PX: u16 = 16;
 
 /// A part of the lower envelope of a run; positions count from the clear pixel before the run.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
 pub struct Parabola {
     /// Position of its lowest point, px.
     apex: u16,

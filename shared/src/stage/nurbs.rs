@@ -17,7 +17,7 @@
 //! equal ones; no ball no curve.
 //!
 //! **Bounds**: coordinates within +-2^20 (others are brought there), 2^20 balls; arcs over 65535 px are
-//! resampled at 65536 points; at most [`MAX_CONTROLS`] control points or what the lent memory holds,
+//! resampled at 65536 points; at most [`MAX_CONTROLS`] control points,
 //! beyond which they stand farther apart. **Error**: control points within 1/256 px of the exact
 //! minimum, evaluation within half of that. **Cost**: about 60 products and 12 divisions per px of arc, then
 //! an [`Envelope`] for 4 right sides. **Deviations**: the paper gives no rule for control points, degree,
@@ -25,6 +25,7 @@
 //! curve passes near its balls, not through them; the radius is floored at [`LEAST_RADIUS`] in
 //! evaluation, not in the controls.
 
+use crate::arena::Arena;
 use crate::envelope::{ENTRY_BITS, Envelope};
 use crate::fixed::{ONE, PX, div_round, saturate};
 use crate::limits::{CapacityError, push};
@@ -93,14 +94,6 @@ impl Default for FitParams {
     }
 }
 
-/// Memory lent to a fit.
-pub struct Scratch<'a> {
-    /// 7 numbers per control point.
-    pub entries: &'a mut [i64],
-    /// One per control point.
-    pub sides: &'a mut [[i64; 4]],
-}
-
 /// A cubic rational B-spline.
 #[derive(Clone, Copy, Debug)]
 pub struct Nurbs<'a> {
@@ -149,16 +142,19 @@ impl<'a> Nurbs<'a> {
         ball
     }
 
-    /// Append balls at equal arc in (u, v), as near to `step` apart (1/256 px) as divides the curve
+    /// Hand balls at equal arc in (u, v) to `take`, as near to `step` apart (1/256 px) as divides the curve
     /// evenly: both ends of an open curve, the start of a closed one once. A curve without extent gives
     /// one ball.
-    pub fn sample(&self, step: i32, balls: &mut VecView<Ball>) -> Result<(), CapacityError> {
+    ///
+    /// # Errors
+    /// That of `take`.
+    pub fn sample<E>(&self, step: i32, mut take: impl FnMut(Ball) -> Result<(), E>) -> Result<(), E> {
         let chord_count = self.end() / (ONE / CHORDS);
         let chord_at =
             |k: i32| chord(self.evaluate(k * (ONE / CHORDS)), self.evaluate((k + 1) * (ONE / CHORDS)));
         let length: i64 = (0..chord_count).map(chord_at).sum();
         let pieces = div_round(length, (step.max(1) as i64) << ARC_BITS).max((length > 0) as i64);
-        push(balls, self.evaluate(0), "balls")?;
+        take(self.evaluate(0))?;
         let (mut k, mut start, mut across) = (0, 0, chord_at(0));
         for piece in 1..pieces {
             let target = part(length, piece, pieces);
@@ -168,10 +164,10 @@ impl<'a> Nurbs<'a> {
                 across = chord_at(k);
             }
             let beyond = div_round((target - start) * (ONE / CHORDS) as i64, across);
-            push(balls, self.evaluate(k * (ONE / CHORDS) + beyond as i32), "balls")?;
+            take(self.evaluate(k * (ONE / CHORDS) + beyond as i32))?;
         }
         if !self.closed && pieces > 0 {
-            push(balls, self.evaluate(self.end()), "balls")?;
+            take(self.evaluate(self.end()))?;
         }
         Ok(())
     }
@@ -182,7 +178,7 @@ pub fn fit(
     samples: &[Sample],
     closed: bool,
     params: &FitParams,
-    scratch: &mut Scratch<'_>,
+    mut scratch: Arena<'_>,
     controls: &mut VecView<Control>,
 ) -> Result<usize, CapacityError> {
     if samples.len() > MAX_BALLS {
@@ -200,16 +196,13 @@ pub fn fit(
         return Ok(DEGREE + 1);
     }
 
-    let limit = MAX_CONTROLS.min(scratch.sides.len()).min(scratch.entries.len() / 7);
-    if limit <= DEGREE {
-        return Err(CapacityError { what: "control points", limit });
-    }
     let spacing = (params.spacing.max(PX) as i64) << ARC_BITS;
-    let count = ((line.length + spacing - 1) / spacing + DEGREE as i64).clamp(DEGREE as i64 + 1, limit as i64)
-        as usize;
-    let sides = &mut scratch.sides[..count];
+    let count = ((line.length + spacing - 1) / spacing + DEGREE as i64)
+        .clamp(DEGREE as i64 + 1, MAX_CONTROLS as i64) as usize;
+    let sides = scratch.take::<[i64; 4]>(count, "control points of a fit")?;
+    let entries = scratch.take::<i64>(Envelope::entries(count, closed), "entries of a fit")?;
     let origin = first.ball.bounded();
-    accumulate(&line, params, origin, &mut Envelope::new(count, closed, scratch.entries)?, sides);
+    accumulate(&line, params, origin, &mut Envelope::new(count, closed, entries)?, sides);
     for side in sides.iter() {
         let unknowns = [0, 1, 2, 3].map(|c| saturate(origin[c] + div_round(side[c], 1 << SIDE_BITS)));
         push(controls, Control { ball: Ball::from_channels(unknowns), weight: ONE }, "control points")?;

@@ -16,19 +16,20 @@
 //! | `Length` | length of the branch, diagonal steps sqrt 2 | score < px |
 //! | `Branches` | area that the branch's balls sweep outside the junction's ball: the sum of 2 radius x step over the pixels farther from the junction than its radius, px^2 | edges > n |
 //!
-//! **Bounds**: as many branches as `tips` holds. **Cost**: n tips take n^2 comparisons and a walk along
+//! **Bounds**: as many branches as the scratch holds. **Cost**: n tips take n^2 comparisons and a walk along
 //! each branch; `Branches` traces the graph about log2(excess) times more.
 //! **Deviations**: the paper prunes by length alone, with no threshold given; `Length` is that rule.
 //! **Not promised**: `Branches(n)` ends one below n when a junction vanishes with the last branch, and
 //! above n when only rings and edges between junctions are left. The swept area leaves out the half disc
 //! at the tip and counts overlaps on the inside of bends twice.
 
-use crate::bitmap::{Bitmap, Plane, Word};
+use crate::arena::{Arena, List};
+use crate::bitmap::{Bitmap, Plane};
 use crate::fixed::PX;
-use crate::limits::{CapacityError, push};
+use crate::limits::CapacityError;
 use crate::point::Pixel;
 use crate::stage::graph::{Graph, Linked, NodeKind, link_count, links, trace};
-use heapless::VecView;
+use bytemuck::{Pod, Zeroable};
 
 /// Which branches to remove.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,7 +58,8 @@ impl Default for Pruning {
 }
 
 /// The free end of a branch.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
 pub struct Tip {
     pixel: Pixel,
     junction: Pixel,
@@ -77,26 +79,26 @@ pub struct Report {
     pub pixels_removed: usize,
 }
 
-/// Prune `skeleton` by `rule` and make `graph` the graph of what is left. `seen` lends as many words as
-/// the skeleton has, `tips` room for every end.
+/// Prune `skeleton` by `rule` and make `graph` the graph of what is left. The scratch holds as many words as
+/// the skeleton has, and every end.
 pub fn prune(
     skeleton: &mut Bitmap<'_>,
     distance: &Plane<'_, u16>,
     rule: Pruning,
-    seen: &mut [Word],
-    tips: &mut VecView<Tip>,
+    mut scratch: Arena<'_>,
     graph: &mut Graph<'_>,
 ) -> Result<Report, CapacityError> {
+    let seen = scratch.take(skeleton.size().words(), "words of scratch")?;
     trace(skeleton, seen, graph)?;
     let edges = graph.edges.len();
     let mut report = Report { edges_before: edges, edges_after: edges, ..Report::default() };
     if rule == Pruning::None {
         return Ok(report);
     }
-    tips.clear();
+    let mut tips = scratch.list("tips");
     for node in graph.nodes.iter().filter(|n| n.kind == NodeKind::End) {
         if let Some(tip) = node.position.pixel().and_then(|p| score(skeleton, distance, rule, p)) {
-            push(tips, tip, "tips")?;
+            tips.push(tip)?;
         }
     }
     loop {
@@ -108,12 +110,12 @@ pub fn prune(
         };
         let before = report.branches_removed;
         while report.branches_removed - before < quota {
-            let Some(least) = least(tips).filter(|&i| tips[i].score < threshold) else { break };
+            let Some(least) = least(&tips).filter(|&i| tips[i].score < threshold) else { break };
             let tip = tips.swap_remove(least);
             report.pixels_removed += erase(skeleton, tip);
             report.branches_removed += 1;
             if link_count(skeleton, tip.junction) == 2 {
-                rescore(skeleton, distance, rule, tip.junction, tips);
+                rescore(skeleton, distance, rule, tip.junction, &mut tips);
             }
         }
         if report.branches_removed == before {
@@ -124,7 +126,7 @@ pub fn prune(
     }
 }
 
-fn least(tips: &VecView<Tip>) -> Option<usize> {
+fn least(tips: &[Tip]) -> Option<usize> {
     let key = |&i: &usize| (tips[i].score, tips[i].pixel.v, tips[i].pixel.u);
     (0..tips.len()).min_by_key(key)
 }
@@ -150,7 +152,7 @@ fn rescore(
     distance: &Plane<'_, u16>,
     rule: Pruning,
     former: Pixel,
-    tips: &mut VecView<Tip>,
+    tips: &mut List<'_, Tip>,
 ) {
     let mut i = 0;
     while i < tips.len() {

@@ -15,26 +15,27 @@
 //!   [`ROW_CROSSINGS`].
 //! * **Not promised**: disparity where the contour runs along the rows; `weight` is then near 0.
 
+use crate::arena::{Arena, List};
 use crate::fixed::{PX, UNIT, div_round};
 use crate::limits::{CapacityError, ROW_CROSSINGS, push};
 use crate::point::{Direction, PixelPoint};
 use crate::stage::contour::{ContourLoop, ContourPoint};
 use crate::stage::plane::ImagePlane;
+use bytemuck::{Pod, Zeroable};
 use heapless::VecView;
 
 /// Where a contour crosses the middle of a row.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
 pub struct RowCrossing {
-    /// Row.
-    pub v: u16,
     /// Column, 1/256 px.
     pub u: i32,
     /// The contour point before the crossing.
     pub index: u32,
-    /// How far on to the next point the crossing lies, 1/256.
-    pub fraction: u8,
-    /// The contour runs downwards here: the object lies to the left.
-    pub downwards: bool,
+    /// Row.
+    pub v: u16,
+    /// Which way the contour runs: 1 downwards, the object to its left, -1 upwards.
+    pub heading: i16,
 }
 
 /// What the right view says about a point of the left contour.
@@ -56,7 +57,8 @@ pub(crate) const fn weight_across(normal_right: Direction) -> u16 {
 }
 
 /// A match that the rest of its loop is filled from.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
 pub struct Trusted {
     /// Contour point.
     index: u32,
@@ -65,7 +67,7 @@ pub struct Trusted {
     /// Sine of the turn from the left to the right normal, 1/16384.
     turn: i32,
     /// As in [`ContourMatch`].
-    weight: u16,
+    weight: u32,
 }
 
 /// How the matching went.
@@ -91,36 +93,38 @@ const AVERAGE_REACH: usize = 3;
 /// The normals of corresponding points differ by less than this (sine, 1/16384: 29 degrees).
 const MAX_TURN: i32 = UNIT * 48 / 100;
 
+/// How many crossings [`row_crossings`] will find in so many rows.
+pub fn count_crossings(points: &[ContourPoint], loops: &[ContourLoop], offset: i32, rows: usize) -> usize {
+    let mut count = 0;
+    each_crossing(points, loops, offset, rows, |_| count += 1);
+    count
+}
+
 /// All crossings of the loops with the rows `v + offset` (1/256 px), ordered by row and column.
 ///
-/// `first` gets, for each row and one beyond, where its crossings begin; it has height + 1 entries.
-///
-/// # Errors
-/// A [`CapacityError`] when `crossings` is too short.
-pub fn row_crossings(
+/// The lent memory: `first` of one entry more than rows, and [`count_crossings`] crossings; those beyond
+/// what is lent are left out.
+pub fn row_crossings<'a>(
     points: &[ContourPoint],
     loops: &[ContourLoop],
     offset: i32,
-    first: &mut [u32],
-    crossings: &mut VecView<RowCrossing>,
-) -> Result<(), CapacityError> {
-    crossings.clear();
+    first: &'a mut [u32],
+    crossings: &'a mut [RowCrossing],
+) -> Rows<'a> {
     first.fill(0);
     let rows = first.len().saturating_sub(1);
-    each_crossing(points, loops, offset, rows, |c| {
-        first[usize::from(c.v) + 1] += 1;
-        push(crossings, c, "row crossings")
-    })?;
+    each_crossing(points, loops, offset, rows, |c| first[usize::from(c.v) + 1] += 1);
     for v in 0..rows {
         first[v + 1] += first[v];
     }
     // Counting sort in place: `first` moves to each row's end while its crossings arrive, and back.
     each_crossing(points, loops, offset, rows, |c| {
         let slot = &mut first[usize::from(c.v)];
-        crossings[*slot as usize] = c;
+        if let Some(place) = crossings.get_mut(*slot as usize) {
+            *place = c;
+        }
         *slot += 1;
-        Ok(())
-    })?;
+    });
     for v in (0..rows).rev() {
         first[v + 1] = first[v];
     }
@@ -128,9 +132,11 @@ pub fn row_crossings(
         *zeroth = 0;
     }
     for v in 0..rows {
-        crossings[first[v] as usize..first[v + 1] as usize].sort_unstable_by_key(|c| (c.u, c.index));
+        if let Some(row) = crossings.get_mut(first[v] as usize..first[v + 1] as usize) {
+            row.sort_unstable_by_key(|c| (c.u, c.index));
+        }
     }
-    Ok(())
+    Rows { first, crossings }
 }
 
 /// Walk along the loops and report where they cross a row.
@@ -139,8 +145,8 @@ fn each_crossing(
     loops: &[ContourLoop],
     offset: i32,
     rows: usize,
-    mut report: impl FnMut(RowCrossing) -> Result<(), CapacityError>,
-) -> Result<(), CapacityError> {
+    mut report: impl FnMut(RowCrossing),
+) {
     for l in loops {
         for i in l.range() {
             let (a, b) = (points[i].at, points[l.step(i, 1)].at);
@@ -151,16 +157,14 @@ fn each_crossing(
             for v in from.max(0)..to.min(rows as i32) {
                 let (run, rise) = (v * PX + offset - a.v, b.v - a.v);
                 report(RowCrossing {
-                    v: v as u16,
                     u: a.lerp(b, run, rise).u,
                     index: i as u32,
-                    fraction: div_round(i64::from(run) * 255, i64::from(rise)) as u8,
-                    downwards: rise > 0,
-                })?;
+                    v: v as u16,
+                    heading: rise.signum() as i16,
+                });
             }
         }
     }
-    Ok(())
 }
 
 /// The crossings of one view, row by row.
@@ -200,17 +204,17 @@ impl<'a> Rows<'a> {
 
 /// Match the left contour's points to the right view.
 ///
-/// `matches` gets one entry a left contour point; `trusted` is scratch for as many.
+/// `matches` gets one entry a left contour point; the scratch holds as many [`Trusted`] as the longest loop.
 ///
 /// # Errors
-/// A [`CapacityError`] when `matches` or `trusted` is too short.
+/// A [`CapacityError`] when `matches` or the scratch is too short.
 pub fn match_rows(
     (left_points, left_loops): (&[ContourPoint], &[ContourLoop]),
     right_points: &[ContourPoint],
     (left, right): (Rows<'_>, Rows<'_>),
     plane: &ImagePlane,
     matches: &mut VecView<ContourMatch>,
-    trusted: &mut VecView<Trusted>,
+    mut scratch: Arena<'_>,
 ) -> Result<RowStatistics, CapacityError> {
     matches.clear();
     for p in left_points {
@@ -232,15 +236,15 @@ pub fn match_rows(
         statistics.unmatched += (edges - known).saturating_sub(cut_off);
     }
     for l in left_loops {
-        trusted.clear();
+        let mut trusted = scratch.fork().list("contour matches");
         for i in l.range().filter(|&i| matches[i].weight > 0) {
             let (p, m) = (&left_points[i], &matches[i]);
             let turn = p.normal.cross(m.normal_right).clamp(-MAX_TURN, MAX_TURN);
             let excess = m.disparity - plane.at(p.at);
-            push(trusted, Trusted { index: i as u32, excess, turn, weight: m.weight }, "contour matches")?;
+            trusted.push(Trusted { index: i as u32, excess, turn, weight: m.weight.into() })?;
         }
-        reject_outliers(trusted);
-        fill(left_points, *l, plane, trusted, matches);
+        reject_outliers(&mut trusted);
+        fill(left_points, *l, plane, &trusted, matches);
     }
     Ok(statistics)
 }
@@ -271,7 +275,7 @@ fn align(a: &[RowCrossing], b: &[RowCrossing], plane: &ImagePlane, mut pair: imp
                 (best, step) = (cost[j] + SKIP, Step::SkipRight);
             }
             let together = diagonal + (y.u - expected).abs();
-            if x.downwards == y.downwards && together <= best {
+            if x.heading == y.heading && together <= best {
                 (best, step) = (together, Step::Pair);
             }
             (cost[j + 1], steps[i + 1][j + 1], diagonal) = (best, step, above);
@@ -308,7 +312,7 @@ fn record(
 }
 
 /// Clear the weight of matches that differ from the running median along the loop.
-fn reject_outliers(trusted: &mut VecView<Trusted>) {
+fn reject_outliers(trusted: &mut List<'_, Trusted>) {
     let n = trusted.len();
     if n > 2 * MEDIAN_REACH {
         let mut window = [0i32; 2 * MEDIAN_REACH + 1];

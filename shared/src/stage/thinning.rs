@@ -21,6 +21,7 @@
 //!
 //! Not promised: lines one pixel wide. [`minimal`] gives those, for any rule.
 
+use crate::arena::Arena;
 use crate::bitmap::{Bitmap, Plane, SetBits, Size, WORD_BITS, Word, at, neighbours_in_rows};
 use crate::limits::{CapacityError, MAX_SIDE};
 use crate::pattern::GOLAY_L;
@@ -59,22 +60,21 @@ pub const fn scratch_order(set_pixels: usize, largest_distance: u16) -> usize {
     set_pixels + largest_distance as usize + 1
 }
 
-/// Thin by a rule. `distance` and `order` serve [`Rule::EdtOrdered`] alone, `lines` the others; what does
-/// not serve may be empty.
+/// Thin by a rule; `distance` serves [`Rule::EdtOrdered`] alone. The scratch holds [`scratch_order`] entries
+/// for that rule, [`scratch_words`] words for the others.
 pub fn thin(
     bitmap: &mut Bitmap<'_>,
     rule: Rule,
     distance: &Plane<'_, u16>,
-    lines: &mut [Word],
-    order: &mut [u32],
+    scratch: Arena<'_>,
 ) -> Result<Report, CapacityError> {
     match rule {
         Rule::HitOrMiss => {
-            cycle(bitmap, lines, GOLAY_L.len(), |k, here, around| GOLAY_L[k].fits_word(here, around))
+            cycle(bitmap, scratch, GOLAY_L.len(), |k, here, around| GOLAY_L[k].fits_word(here, around))
         }
-        Rule::ZhangSuen => cycle(bitmap, lines, 2, |k, here, around| here & zhang_suen(k == 0, around)),
-        Rule::GuoHall => cycle(bitmap, lines, 2, |k, here, around| here & guo_hall(k == 0, around)),
-        Rule::EdtOrdered => edt_ordered(bitmap, distance, order),
+        Rule::ZhangSuen => cycle(bitmap, scratch, 2, |k, here, around| here & zhang_suen(k == 0, around)),
+        Rule::GuoHall => cycle(bitmap, scratch, 2, |k, here, around| here & guo_hall(k == 0, around)),
+        Rule::EdtOrdered => edt_ordered(bitmap, distance, scratch),
     }
 }
 
@@ -82,13 +82,11 @@ pub fn thin(
 /// until a whole cycle finds nothing.
 fn cycle(
     bitmap: &mut Bitmap<'_>,
-    lines: &mut [Word],
+    mut scratch: Arena<'_>,
     steps: usize,
     finds: impl Fn(usize, Word, [Word; 8]) -> Word,
 ) -> Result<Report, CapacityError> {
-    let limit = lines.len();
-    let needed = scratch_words(bitmap.size());
-    let lines = lines.get_mut(..needed).ok_or(CapacityError { what: "words of scratch", limit })?;
+    let lines = scratch.take(scratch_words(bitmap.size()), "words of scratch")?;
     let Some(bounds) = bitmap.bounds() else { return Ok(Report::default()) };
     let mut report = Report::default();
     loop {
@@ -196,9 +194,9 @@ const _: () = assert!(MAX_SIDE <= 1 << COLUMN_BITS);
 fn edt_ordered(
     bitmap: &mut Bitmap<'_>,
     distance: &Plane<'_, u16>,
-    order: &mut [u32],
+    scratch: Arena<'_>,
 ) -> Result<Report, CapacityError> {
-    let list = sort_by_distance(bitmap, distance, order)?;
+    let list = sort_by_distance(bitmap, distance, scratch)?;
     let all = list.len();
     let (mut left, mut cycles) = (all, 0);
     loop {
@@ -238,14 +236,12 @@ fn is_removable(neighbours: u8) -> bool {
 fn sort_by_distance<'o>(
     bitmap: &Bitmap<'_>,
     distance: &Plane<'_, u16>,
-    order: &'o mut [u32],
+    mut scratch: Arena<'o>,
 ) -> Result<&'o mut [u32], CapacityError> {
     let pixels = || bitmap.pixels().map(|p| (i32::from(p.u), i32::from(p.v)));
     let largest = pixels().map(|(u, v)| distance.get(u, v)).max().unwrap_or(0);
-    let (set, limit) = (bitmap.count(), order.len());
-    let order = order
-        .get_mut(..scratch_order(set, largest))
-        .ok_or(CapacityError { what: "entries of the thinning order", limit })?;
+    let set = bitmap.count();
+    let order = scratch.take::<u32>(scratch_order(set, largest), "entries of the thinning order")?;
     let (list, next) = order.split_at_mut(set);
     next.fill(0);
     for (u, v) in pixels() {

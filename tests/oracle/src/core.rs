@@ -2,32 +2,29 @@
 
 use heapless::Vec as List;
 use shared::bitmap::{Grey, Size, Word};
-use shared::pipeline::{self, Branch, EyeMemory, Finding, Memory, Observer, Outcome, Scratch, Settings};
+use shared::pipeline::{
+    self, Branch, EyeMemory, Finding, Memory, Observer, Outcome, Settings, scratch_words,
+};
 use shared::point::{Pixel, PixelPoint};
-use shared::stage::branch::{Ball, Sample};
-use shared::stage::contour::{ContourLoop, ContourPoint, EdgeCrossing};
+use shared::stage::branch::Sample;
+use shared::stage::contour::{ContourLoop, ContourPoint};
 use shared::stage::depth::BallDepth;
-use shared::stage::distance::{Parabola, scratch_parabolas};
 use shared::stage::graph::{Edge, Graph, Member, Node};
 use shared::stage::medial::MedialBall;
 use shared::stage::nearest::Pair;
 use shared::stage::nurbs::{Control, MAX_CONTROLS};
-use shared::stage::prune::Tip;
-use shared::stage::rows::{ContourMatch, RowCrossing, Trusted};
+use shared::stage::rows::ContourMatch;
 use shared::stage::thinning::scratch_order;
 
 /// `picture[v][u]`: a grey value.
 pub type Picture = Vec<Vec<u8>>;
 
 /// The parts of one eye's memory, then those that both eyes share.
-pub const PARTS: [&str; 30] = [
+pub const PARTS: [&str; 17] = [
     "mask",
-    "skeleton",
     "contour",
     "loops",
     "hull",
-    "crossings",
-    "rows",
     "nodes",
     "edges",
     "path",
@@ -35,22 +32,12 @@ pub const PARTS: [&str; 30] = [
     "samples",
     "branches",
     "controls",
-    "grey",
-    "words",
-    "plane",
-    "parabolas",
-    "order",
-    "cracks",
-    "tips",
-    "trusted",
-    "points",
-    "entries",
-    "sides",
     "matches",
     "balls",
     "depths",
     "boundary pairs",
     "skeleton pairs",
+    "scratch",
 ];
 
 #[derive(Default)]
@@ -58,7 +45,6 @@ struct EyeLists<const N: usize> {
     contour: Box<List<ContourPoint, N>>,
     loops: Box<List<ContourLoop, N>>,
     hull: Box<List<PixelPoint, N>>,
-    crossings: Box<List<RowCrossing, N>>,
     nodes: Box<List<Node, N>>,
     edges: Box<List<Edge, N>>,
     path: Box<List<Pixel, N>>,
@@ -71,10 +57,6 @@ struct EyeLists<const N: usize> {
 #[derive(Default)]
 struct Lists<const N: usize> {
     eyes: [EyeLists<N>; 2],
-    cracks: Box<List<EdgeCrossing, N>>,
-    tips: Box<List<Tip, N>>,
-    trusted: Box<List<Trusted, N>>,
-    points: Box<List<Ball, N>>,
     matches: Box<List<ContourMatch, N>>,
     balls: Box<List<MedialBall, N>>,
     depths: Box<List<BallDepth, N>>,
@@ -85,30 +67,16 @@ struct Lists<const N: usize> {
 #[derive(Default)]
 struct Slices {
     masks: [Vec<Word>; 2],
-    skeletons: [Vec<Word>; 2],
-    rows: [Vec<u32>; 2],
-    grey: Vec<u8>,
-    words: Vec<Word>,
-    plane: Vec<u16>,
-    parabolas: Vec<Parabola>,
-    order: Vec<u32>,
-    entries: Vec<i64>,
-    sides: Vec<[i64; 4]>,
+    scratch: Vec<u64>,
 }
 
 impl Slices {
     fn fit(&mut self, size: Size) {
-        for words in self.masks.iter_mut().chain(&mut self.skeletons) {
+        for words in &mut self.masks {
             words.resize(size.words(), 0x55);
         }
-        self.rows.iter_mut().for_each(|rows| rows.resize(size.height + 1, 7));
-        self.grey.resize(size.pixels(), 7);
-        self.words.resize(2 * size.words(), 0x55);
-        self.plane.resize(size.pixels(), 7);
-        self.parabolas.resize(scratch_parabolas(size.width), Parabola::default());
-        self.order.resize(scratch_order(size.pixels(), u16::MAX), 7);
-        self.entries.resize(7 * MAX_CONTROLS, 7);
-        self.sides.resize(MAX_CONTROLS, [7; 4]);
+        let order = scratch_order(size.pixels(), u16::MAX);
+        self.scratch.resize(scratch_words(size, 16384, MAX_CONTROLS, order), 0x55);
     }
 }
 
@@ -139,18 +107,13 @@ impl Core {
         let [left, right] = &mut long.eyes;
         let [short_left, short_right] = &mut short.eyes;
         let [left_mask, right_mask] = &mut slices.masks;
-        let [left_skeleton, right_skeleton] = &mut slices.skeletons;
-        let [left_rows, right_rows] = &mut slices.rows;
         macro_rules! eye {
-            ($long:expr, $short:expr, $mask:expr, $skeleton:expr, $rows:expr) => {
+            ($long:expr, $short:expr, $mask:expr) => {
                 EyeMemory {
                     mask: slice!("mask", $mask),
-                    skeleton: slice!("skeleton", $skeleton),
-                    rows: slice!("rows", $rows),
                     contour: list!("contour", $long.contour, $short.contour),
                     loops: list!("loops", $long.loops, $short.loops),
                     hull: list!("hull", $long.hull, $short.hull),
-                    crossings: list!("crossings", $long.crossings, $short.crossings),
                     graph: Graph {
                         nodes: list!("nodes", $long.nodes, $short.nodes),
                         edges: list!("edges", $long.edges, $short.edges),
@@ -164,28 +127,13 @@ impl Core {
             };
         }
         Memory {
-            eyes: [
-                eye!(left, short_left, left_mask, left_skeleton, left_rows),
-                eye!(right, short_right, right_mask, right_skeleton, right_rows),
-            ],
-            scratch: Scratch {
-                grey: slice!("grey", slices.grey),
-                words: slice!("words", slices.words),
-                plane: slice!("plane", slices.plane),
-                parabolas: slice!("parabolas", slices.parabolas),
-                order: slice!("order", slices.order),
-                edges: list!("cracks", long.cracks, short.cracks),
-                tips: list!("tips", long.tips, short.tips),
-                trusted: list!("trusted", long.trusted, short.trusted),
-                points: list!("points", long.points, short.points),
-                entries: slice!("entries", slices.entries),
-                sides: slice!("sides", slices.sides),
-            },
+            eyes: [eye!(left, short_left, left_mask), eye!(right, short_right, right_mask)],
             matches: list!("matches", long.matches, short.matches),
             balls: list!("balls", long.balls, short.balls),
             depths: list!("depths", long.depths, short.depths),
             boundary_pairs: list!("boundary pairs", long.boundary_pairs, short.boundary_pairs),
             skeleton_pairs: list!("skeleton pairs", long.skeleton_pairs, short.skeleton_pairs),
+            scratch: slice!("scratch", slices.scratch),
         }
     }
 

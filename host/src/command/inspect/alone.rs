@@ -5,6 +5,7 @@
 use super::{Args, Made, Stage};
 use crate::report::record::{DistanceImage, mask_image};
 use image::GrayImage;
+use shared::arena::{Arena, words};
 use shared::bitmap::{Bitmap, Grey, Plane, Size, Word};
 use shared::limits::{CapacityError, MAX_SIDE};
 use shared::point::PixelPoint;
@@ -25,7 +26,7 @@ struct Memory {
     more_words: Vec<Word>,
     plane: Vec<u16>,
     parabolas: Vec<Parabola>,
-    order: Vec<u32>,
+    scratch: Vec<u64>,
     hull: Box<heapless::Vec<PixelPoint, VERTICES>>,
     bytes: Vec<u8>,
     thinned: thinning::Report,
@@ -36,10 +37,10 @@ impl Memory {
         Self {
             size,
             words: vec![0; size.words()],
-            more_words: vec![0; size.words().max(thinning::scratch_words(size))],
+            more_words: vec![0; size.words()],
             plane: vec![0; size.pixels()],
             parabolas: vec![Parabola::default(); distance::scratch_parabolas(size.width)],
-            order: vec![0; thinning::scratch_order(size.pixels(), u16::MAX)],
+            scratch: vec![0; words::<u32>(thinning::scratch_order(size.pixels(), u16::MAX))],
             hull: Box::default(),
             bytes: vec![0; size.pixels()],
             thinned: thinning::Report::default(),
@@ -63,7 +64,7 @@ impl Memory {
                     Rule::EdtOrdered => distance(&bitmap, &mut self.plane, &mut self.parabolas)?,
                     _ => Plane::over(self.size, &mut self.plane)?,
                 };
-                self.thinned = thin(&mut bitmap, rule, &plane, &mut self.more_words, &mut self.order)?;
+                self.thinned = thin(&mut bitmap, rule, &plane, Arena::new(&mut self.scratch))?;
                 unpack(&bitmap, &mut self.bytes);
             }
             Stage::Distance => {

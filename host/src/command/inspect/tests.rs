@@ -1,10 +1,11 @@
 use super::*;
 use clap::Parser;
 use image::Luma;
+use shared::arena::Arena;
 use shared::bitmap::{Bitmap, Size};
 use shared::stage::boundary::{Element, boundary};
 use shared::stage::distance::{self, distance};
-use shared::stage::thinning::{scratch_order, scratch_words, thin};
+use shared::stage::thinning::thin;
 
 #[derive(Parser)]
 struct Cli {
@@ -48,8 +49,7 @@ fn thinning_is_the_cores_for_every_rule() {
         let mut data = vec![0; size.pixels()];
         let mut parabolas = vec![distance::Parabola::default(); distance::scratch_parabolas(97)];
         let plane = distance(&bitmap, &mut data, &mut parabolas).unwrap();
-        let mut order = vec![0; scratch_order(size.pixels(), u16::MAX)];
-        thin(&mut bitmap, rule, &plane, &mut vec![0; scratch_words(size)], &mut order).unwrap();
+        thin(&mut bitmap, rule, &plane, Arena::new(&mut vec![7; 1 << 15])).unwrap();
         assert_eq!(pixels(&made.rasters.skeleton), set(&bitmap), "{name}");
         assert_eq!(made.times.len(), 2);
     }
