@@ -300,8 +300,8 @@ impl Sensor {
             }
             [luma, (90 + u % 60) as u8, (140 + v % 60) as u8]
         };
-        // A change is seen in the frame after the next: until then the upper half is an older one.
-        let torn = begin < self.changed + self.period();
+        // A change is seen two frames after it: until then the upper half is an older one.
+        let torn = begin < self.changed + 2 * self.period();
         let mut bytes = Vec::with_capacity(2 * format.width * format.height);
         for v in 0..format.height {
             for u in 0..format.width {
