@@ -16,14 +16,17 @@
 //! * **Whatever happens** is counted, told and gone on from: any bytes, any fault of any port, reports that
 //!   nobody asked for.
 
+mod action;
 mod calibration;
 mod command;
 pub mod exposure;
 mod link;
 mod pair;
 
+pub use action::{Action, Event};
+
 use crate::memory::Storage;
-use crate::ports::{CameraError, CameraFault, Exposure, FlashError, Identity, LinkError, Side, Stamps};
+use crate::ports::{CameraFault, Exposure, Identity, Side};
 use calibration::Calibration;
 use exposure::Control;
 use link::{Inbox, MAX_COMMAND, Outbox, Waiting};
@@ -40,53 +43,6 @@ pub const HEALTH_US: u64 = 10_000_000;
 pub const RETRY_US: u64 = 2_000_000;
 /// Faults in a row after which the eyes are started again, whatever the faults were.
 pub const PATIENCE: u32 = 3;
-
-/// What a device is to do next.
-#[derive(Debug, PartialEq, Eq)]
-#[must_use]
-pub enum Action<'a> {
-    /// Fill the buffer with the record in flash: [`Event::Loaded`].
-    Load(&'a mut [u8]),
-    /// Make this the record in flash; an empty one stands for none: [`Event::Saved`].
-    Save(&'a [u8]),
-    /// Fill the buffer with bytes that have come: [`Event::Received`].
-    Receive(&'a mut [u8]),
-    /// Send a frame: [`Event::Sent`].
-    Send(&'a [u8]),
-    /// Start both eyes: [`Event::Started`].
-    Start(Exposure),
-    /// Change the exposure of both eyes: [`Event::Exposed`].
-    Expose(Exposure),
-    /// Take a picture with both eyes: [`Event::Captured`].
-    Capture,
-    /// Hand every row of an eye's picture to [`Device::line`]: [`Event::Read`].
-    Read(Side),
-    /// Ask again at once; there is nothing to report.
-    Continue,
-    /// Ask again when bytes or some milliseconds have come; there is nothing to report.
-    Rest,
-}
-
-/// What came of an action.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Event {
-    /// Length of the record in the buffer, 0 for none.
-    Loaded(Result<usize, FlashError>),
-    /// Whether the record stands.
-    Saved(Result<(), FlashError>),
-    /// Number of bytes in the buffer.
-    Received(Result<usize, LinkError>),
-    /// Whether the frame went out.
-    Sent(Result<(), LinkError>),
-    /// What the eyes are.
-    Started(Result<[Identity; 2], CameraError>),
-    /// Whether the exposure is the one ordered.
-    Exposed(Result<(), CameraError>),
-    /// When the pictures were taken.
-    Captured(Result<Stamps, CameraError>),
-    /// Whether all rows were handed over.
-    Read(Result<(), CameraError>),
-}
 
 /// What a board knows when it boots.
 #[derive(Clone, Copy, Debug)]
@@ -410,7 +366,7 @@ impl<'m> Device<'m> {
 const _: () = {
     const QVGA: usize = knots(<crate::memory::Qvga as Storage>::CAPACITIES.size);
     assert!(
-        size_of::<Device<'_>>() + size_of::<Desk<QVGA>>() <= 16 * 1024,
-        "beside the core's memory the device takes what is left of 400 KB"
+        size_of::<Device<'_>>() + size_of::<Desk<QVGA>>() <= 14 * 1024,
+        "the core's memory, stack and drivers need the rest of 400 KB"
     );
 };
