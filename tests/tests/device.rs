@@ -453,6 +453,7 @@ fn pictures_asked_for_survive_a_fault() {
     let (mut bench, world) = bench(scenes(Solid::Capsule));
     bench.next_hello();
     world.borrow_mut().faults.push_back(CameraFault::TimeLimit(500_000));
+    world.borrow_mut().read_breaks = Some(100);
     assert_eq!(bench.ask(&ToDevice::Grab(PictureKind::Grey)), Ok(()));
     let [left, _] = bench.pictures(PictureKind::Grey);
     assert_eq!(left, world.borrow().read[0]);
