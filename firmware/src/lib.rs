@@ -1,12 +1,14 @@
 //! Ossature on a microcontroller: the core of `shared`, run where the pictures are taken.
 //!
-//! What stands so far is what the device needs from its board ([`ports`]), a driver for two camera modules
-//! ([`camera`]), the memory that the core borrows ([`memory`]) and a self-test that runs the whole pipeline on
-//! drawn pictures ([`selftest`], `src/bin/selftest.rs`). The device's event loop (`device.rs`) and the board's
-//! registers (`board/`, which alone may touch them) come beside them.
+//! [`device`] decides: events in, actions out, no I/O. [`drive`] carries its actions out through the traits
+//! of [`ports`], on a board, in an emulator and on a PC alike. [`memory`] is what the core borrows, `camera`
+//! drives the eyes over embedded-hal 1.0, and [`selftest`] runs the core on drawn pictures. Registers belong
+//! to `board/` alone.
 #![no_std]
 
 pub mod camera;
+pub mod device;
+pub mod drive;
 pub mod memory;
 pub mod ports;
 pub mod selftest;
