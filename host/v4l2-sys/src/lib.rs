@@ -11,7 +11,10 @@
 //! ioctl's number contains the size of its structure.
 
 #[rustfmt::skip]
-#[expect(missing_docs, non_camel_case_types, unused_qualifications, reason = "generated from the kernel's names")]
+#[expect(
+    missing_docs, non_camel_case_types, non_snake_case, non_upper_case_globals,
+    reason = "generated from the kernel's names"
+)]
 mod bindings;
 
 pub use bindings::*;
