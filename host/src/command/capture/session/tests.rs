@@ -132,9 +132,9 @@ fn the_best_of_a_burst_is_one_model() {
     let more = ["--focal", "375", "--baseline", "60", "--frames", "3", "--best"];
     // A second, smaller thing in the picture is a warning.
     let mut worse = both_eyes(1);
-    for row in worse.chunks_mut(656).take(30).skip(5) {
-        row[5..25].fill(255);
-        row[325..345].fill(255);
+    for row in worse.chunks_mut(656).take(45).skip(5) {
+        row[5..65].fill(255);
+        row[325..385].fill(255);
     }
     capture(folder.path(), vec![worse, both_eyes(1), empty(), empty()], &more).unwrap();
     let files = ["boundary.ply", "model.ply", "report.json", "skeleton.ply"];
