@@ -211,12 +211,16 @@ fn worth(choice: &Choice) -> impl PartialOrd {
 /// What a camera offers that is read, in a few words.
 #[must_use]
 pub fn offers(camera: &Camera) -> String {
+    let read: Vec<&Offer> = camera.offers.iter().filter(|offer| offer.is_read()).collect();
     let mut words: Vec<String> = Vec::new();
-    for offer in camera.offers.iter().filter(|offer| offer.is_read()) {
-        if offer.sizes.is_empty() {
-            words.push(format!("{} (now {}x{})", offer.code, camera.current.1.0, camera.current.1.1));
+    // Formats that come in the same sizes are told together.
+    for alike in read.chunk_by(|a, b| a.sizes == b.sizes) {
+        let codes = alike.iter().map(|offer| offer.code.to_string()).collect::<Vec<_>>().join(" or ");
+        let sizes = &alike[0].sizes;
+        if sizes.is_empty() {
+            words.push(format!("{codes} (now {}x{})", camera.current.1.0, camera.current.1.1));
         }
-        words.extend(offer.sizes.iter().map(|sizes| format!("{} {}", offer.code, sizes_in_words(sizes))));
+        words.extend(sizes.iter().map(|sizes| format!("{codes} {}", sizes_in_words(sizes))));
     }
     let more = words.len().saturating_sub(LISTED);
     words.truncate(LISTED);
