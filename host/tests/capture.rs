@@ -25,7 +25,7 @@ fn bad(args: &[&str], code: i32) -> String {
 
 #[test]
 fn wrong_usage_is_2() {
-    let wrong: [&[&str]; 15] = [
+    let wrong: [&[&str]; 18] = [
         &["capture"],
         &["capture", "--device"],
         &["capture", "--device", "a", "--device", "b", "--device", "c", "--calib", "c"],
@@ -40,6 +40,9 @@ fn wrong_usage_is_2() {
         &["capture", "--device", "a", "--frames", "3", "--seconds", "3"],
         &["capture", "--device", "a", "--roi", "1,2,3"],
         &["capture", "--device", "a", "--background", "b", "--polarity", "dark"],
+        &["capture", "--device", "a", "--only-record"],
+        &["capture", "--device", "a", "--only-record", "--record", "b", "--best"],
+        &["calibrate", "--calib", "a"],
         &["list-devices", "all"],
     ];
     for args in wrong {

@@ -45,7 +45,7 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// Begins a recording. A calibration that OpenCV's file cannot hold (fisheye lenses, eyes of two sizes)
+    /// Begins a recording, with a calibration if there is one. One that OpenCV's file cannot hold (fisheye lenses, eyes of two sizes)
     /// is copied from `file`, a Kalibr camchain.
     ///
     /// # Errors
@@ -53,7 +53,7 @@ impl Recording {
     /// See [`RecordError`].
     pub fn begin(
         folder: &Path,
-        calibration: &StereoCamera,
+        calibration: Option<&StereoCamera>,
         file: Option<&Path>,
     ) -> Result<Self, RecordError> {
         let failed = |source| RecordError::Folder { path: folder.into(), source };
@@ -61,6 +61,8 @@ impl Recording {
         if std::fs::read_dir(folder).map_err(failed)?.next().is_some() {
             return Err(RecordError::NotEmpty { path: folder.into() });
         }
+        let recording = Self { folder: folder.into() };
+        let Some(calibration) = calibration else { return Ok(recording) };
         match (calibration.write_opencv_yaml(folder.join("calib.yaml")), file) {
             (Err(CalibrationError::Inexpressible { .. }), Some(file)) if file.is_file() => {
                 let bytes = std::fs::read(file).map_err(failed)?;
@@ -68,7 +70,7 @@ impl Recording {
             }
             (result, _) => result?,
         }
-        Ok(Self { folder: folder.into() })
+        Ok(recording)
     }
 
     /// Adds a pair.
@@ -101,7 +103,7 @@ mod tests {
         let parent = tempfile::tempdir().unwrap();
         let folder = parent.path().join("new/recording");
         let camera = StereoCamera::rectified(5, 3, 4.0, 60.0);
-        let recording = Recording::begin(&folder, &camera, None).unwrap();
+        let recording = Recording::begin(&folder, Some(&camera), None).unwrap();
         let view = |number: u64, eye: u32| {
             GrayImage::from_fn(5, 3, |u, v| Luma([(number as u32 * 50 + eye * 20 + u + 5 * v) as u8]))
         };
@@ -115,7 +117,8 @@ mod tests {
             assert_eq!(pair.load().unwrap().images, [view(number, 0), view(number, 1)]);
             assert_eq!(StereoCamera::read(pair.calibration.as_ref().unwrap()).unwrap(), camera);
         }
-        let error = Recording::begin(&folder, &camera, None).unwrap_err().to_string();
+        let error = Recording::begin(&folder, Some(&camera), None).unwrap_err().to_string();
         assert!(error.contains("not empty"), "{error}");
+        Recording::begin(&parent.path().join("board"), None, None).unwrap();
     }
 }

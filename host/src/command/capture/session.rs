@@ -10,6 +10,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 
 use super::super::model::{self, Model, Order, warnings};
+use super::super::options::NoCalibration;
 use super::super::table::{Table, count, sides};
 use super::super::{Failure, note, say, say_json, words_of};
 use super::Args;
@@ -26,7 +27,8 @@ use crate::source::v4l::pair::Pairs;
 pub(super) struct Rig<D> {
     pub(super) pairs: Pairs<D>,
     pub(super) optics: Optics,
-    pub(super) calibration: StereoCamera,
+    /// None only if nothing but recording is wanted.
+    pub(super) calibration: Option<StereoCamera>,
     /// The file that the calibration comes from.
     pub(super) file: Option<PathBuf>,
 }
@@ -35,7 +37,7 @@ pub(super) struct Rig<D> {
 pub(super) struct Session<'a> {
     args: &'a Args,
     options: &'a Options,
-    calibration: StereoCamera,
+    calibration: Option<StereoCamera>,
     scene: Scene,
     recording: Option<Recording>,
     /// Pairs still to be thrown away.
@@ -79,7 +81,7 @@ impl<'a> Session<'a> {
         scene: Scene,
         rig: &Rig<D>,
     ) -> Result<Self, Failure> {
-        let record = |folder| Recording::begin(folder, &rig.calibration, rig.file.as_deref());
+        let record = |folder| Recording::begin(folder, rig.calibration.as_ref(), rig.file.as_deref());
         let recording = args.record.as_deref().map(record).transpose()?;
         let bar = ProgressBar::new_spinner();
         if let Ok(style) = ProgressStyle::with_template("{spinner} {msg}") {
@@ -156,7 +158,9 @@ impl<'a> Session<'a> {
         if let Some(recording) = &self.recording {
             recording.add(number, &views.images)?;
         }
-        let result = if self.args.best {
+        let result = if self.args.only_record {
+            Ok(Success { size: "recorded".into(), warnings: Vec::new() })
+        } else if self.args.best {
             self.weigh(views.images)
         } else {
             let folder = self.args.out.join(&name);
@@ -175,9 +179,15 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
+    /// The views as the scene has them, and their calibration.
+    fn seen(&self, views: [GrayImage; 2]) -> Result<([GrayImage; 2], StereoCamera), Failure> {
+        let calibration = self.calibration.as_ref().ok_or(NoCalibration)?;
+        Ok(self.scene.apply(views, calibration)?)
+    }
+
     /// The model of a pair, in its folder.
     fn make(&self, views: [GrayImage; 2], folder: PathBuf) -> Result<Model, Failure> {
-        let (images, calibration) = self.scene.apply(views, &self.calibration)?;
+        let (images, calibration) = self.seen(views)?;
         model::make(Order {
             images,
             calibration: &calibration,
@@ -190,7 +200,7 @@ impl<'a> Session<'a> {
 
     /// Keeps a pair if it is the best so far; the first of equals stays.
     fn weigh(&mut self, views: [GrayImage; 2]) -> Result<Success, Failure> {
-        let ([left, right], calibration) = self.scene.apply(views.clone(), &self.calibration)?;
+        let ([left, right], calibration) = self.seen(views.clone())?;
         let made = reconstruct(left, right, &calibration, self.options, &mut ())?;
         let warnings = warnings(&made);
         let rows = made.outcome.rows;
@@ -225,9 +235,10 @@ impl<'a> Session<'a> {
         let good = self.done.iter().filter(|done| done.result.is_ok()).count();
         let bad = self.done.len() - good;
         let (ms, dropped) = (done.latency.as_millis(), tally.dropped);
-        self.bar.set_message(format!("{good} models, {bad} refused, {dropped} pairs dropped, last {ms} ms"));
+        let made = self.made();
+        self.bar.set_message(format!("{good} {made}, {bad} refused, {dropped} pairs dropped, last {ms} ms"));
         self.bar.tick();
-        if !self.args.json {
+        if !self.args.json && !self.args.only_record {
             let line = match &done.result {
                 Ok(success) => {
                     let warnings = match success.warnings.as_slice() {
@@ -243,6 +254,15 @@ impl<'a> Session<'a> {
         }
     }
 
+    /// What becomes of a pair that is not refused.
+    fn made(&self) -> &'static str {
+        match (self.args.only_record, self.args.best) {
+            (true, _) => "recorded",
+            (false, true) => "good",
+            (false, false) => "models",
+        }
+    }
+
     fn tell(&self, line: &str) {
         self.bar.suspend(|| note(line));
     }
@@ -250,7 +270,7 @@ impl<'a> Session<'a> {
     fn as_text(&self, tally: &Tally, best: Option<&(String, Model)>) -> String {
         let mut table = Table::new("capture");
         let good = self.done.iter().filter(|done| done.result.is_ok()).count();
-        table.row("pairs", &format!("{}, of which {good} have a model", self.done.len()));
+        table.row("pairs", &format!("{}: {good} {}", self.done.len(), self.made()));
         let mut latencies: Vec<Duration> = self.done.iter().map(|done| done.latency).collect();
         latencies.sort();
         if let (Some(middle), Some(most)) = (latencies.get(latencies.len() / 2), latencies.last()) {
@@ -281,7 +301,7 @@ impl<'a> Session<'a> {
             model.tell(&mut table);
             model.warnings().iter().for_each(|warning| table.row("warning", warning));
         }
-        if good > 0 {
+        if good > 0 && !self.args.only_record {
             table.row("files", &self.args.out.display().to_string());
         }
         table.text().to_owned()
