@@ -1,7 +1,7 @@
 //! A run of `capture`: what is done with each pair, and what is told of it.
 
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
@@ -164,7 +164,7 @@ impl<'a> Session<'a> {
             self.weigh(views.images)
         } else {
             let folder = self.args.out.join(&name);
-            self.make(views.images, folder)
+            self.make(views.images, &folder)
                 .map(|model| Success { size: sides(model.size()), warnings: model.warnings() })
         };
         let result = match result {
@@ -186,7 +186,7 @@ impl<'a> Session<'a> {
     }
 
     /// The model of a pair, in its folder.
-    fn make(&self, views: [GrayImage; 2], folder: PathBuf) -> Result<Model, Failure> {
+    fn make(&self, views: [GrayImage; 2], folder: &Path) -> Result<Model, Failure> {
         let (images, calibration) = self.seen(views)?;
         model::make(Order {
             images,
@@ -194,7 +194,7 @@ impl<'a> Session<'a> {
             options: self.options,
             pictures: !self.args.no_pictures,
             truth: None,
-            folder: &folder,
+            folder,
         })
     }
 
@@ -215,7 +215,7 @@ impl<'a> Session<'a> {
     /// Makes the model of the best pair, if that is what is wanted.
     fn make_best(&mut self) -> Result<Option<(String, Model)>, Failure> {
         let Some(best) = self.best.take() else { return Ok(None) };
-        let model = self.make(best.views, self.args.out.clone())?;
+        let model = self.make(best.views, &self.args.out)?;
         Ok(Some((self.done[best.index].name.clone(), model)))
     }
 

@@ -75,7 +75,7 @@ mod tests {
         Watched::new(Simulated::grey("/dev/video0", script))
     }
 
-    const GO: AtomicBool = AtomicBool::new(false);
+    static GO: AtomicBool = AtomicBool::new(false);
 
     #[test]
     fn a_stalled_camera_is_started_anew_and_counted() {
