@@ -24,6 +24,7 @@
 //!   host capture --device /dev/video0 --record board --only-record --fps 5
 
 mod session;
+mod telling;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -143,6 +144,11 @@ impl Eyes {
 /// A [`clap::Error`] for wrong usage; if a camera fails, results cannot be written, or no pair gave a model.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let layout = args.layout.layout(args.device.len())?;
+    if let [left, right] = args.device.as_slice()
+        && left == right
+    {
+        return Err(usage("both devices are the same camera: give two, or one that sees with both eyes"));
+    }
     let mut options = args.method.options()?;
     let prepared = told(args.json, {
         let scene = args.scene.scene(None, args.swap, &mut options);

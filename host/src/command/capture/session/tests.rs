@@ -9,6 +9,7 @@ use crate::source::v4l::layout::Layout;
 use crate::source::v4l::simulated::{Event, Simulated};
 use crate::view::Calibrated;
 use clap::Parser;
+use serde_json::Value;
 use std::fs;
 use std::path::Path;
 
