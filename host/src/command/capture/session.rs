@@ -1,0 +1,231 @@
+//! A run of `capture`: what is done with each pair, and what is told of it.
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
+
+use image::GrayImage;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::super::model::{self, Model, Order, warnings};
+use super::super::options::NoCalibration;
+use super::super::table::{count, sides};
+use super::super::{Failure, say, say_json, words_of};
+use super::Args;
+use crate::calibration::StereoCamera;
+use crate::reconstruct::{Options, Refusal, reconstruct};
+use crate::source::recording::Recording;
+use crate::source::scene::Scene;
+use crate::source::v4l::device::{Device, now};
+use crate::source::v4l::live::{self, Live, Optics, Tally};
+use crate::source::v4l::pair::Pairs;
+
+/// Cameras that are set, and what their pixels mean.
+pub(super) struct Rig<D> {
+    pub(super) pairs: Pairs<D>,
+    pub(super) optics: Optics,
+    /// None only if nothing but recording is wanted.
+    pub(super) calibration: Option<StereoCamera>,
+    /// The file that the calibration comes from.
+    pub(super) file: Option<PathBuf>,
+}
+
+/// A run.
+pub(super) struct Session<'a> {
+    pub(super) args: &'a Args,
+    options: &'a Options,
+    calibration: Option<StereoCamera>,
+    scene: Scene,
+    recording: Option<Recording>,
+    /// Pairs still to be thrown away.
+    skip: u64,
+    begun: Instant,
+    pub(super) bar: ProgressBar,
+    pub(super) done: Vec<Done>,
+    best: Option<Best>,
+    /// What went wrong on this side of the camera.
+    failure: Option<Failure>,
+}
+
+/// What became of a pair.
+pub(super) struct Done {
+    pub(super) name: String,
+    pub(super) result: Result<Success, String>,
+    /// From the arrival of its last frame to its files.
+    pub(super) latency: Duration,
+    /// Right less left time, seconds, of two cameras.
+    pub(super) gap: Option<f64>,
+}
+
+pub(super) struct Success {
+    /// In a few words.
+    pub(super) size: String,
+    pub(super) warnings: Vec<String>,
+}
+
+/// The best pair so far, as it was taken.
+struct Best {
+    index: usize,
+    views: [GrayImage; 2],
+    /// Warnings, and the part of the outline without counterpart: less is better.
+    worth: (usize, f64),
+}
+
+impl<'a> Session<'a> {
+    /// Nothing done yet. The folder of a recording must be new or empty.
+    pub(super) fn begin<D>(
+        args: &'a Args,
+        options: &'a Options,
+        scene: Scene,
+        rig: &Rig<D>,
+    ) -> Result<Self, Failure> {
+        let calibration = rig.calibration.map(|calibration| (calibration, rig.file.clone()));
+        let record = |folder| Recording::begin(folder, calibration);
+        let recording = args.record.as_deref().map(record).transpose()?;
+        let bar = ProgressBar::new_spinner();
+        if let Ok(style) = ProgressStyle::with_template("{spinner} {msg}") {
+            bar.set_style(style);
+        }
+        Ok(Self {
+            args,
+            options,
+            calibration: rig.calibration,
+            scene,
+            recording,
+            skip: args.skip,
+            begun: Instant::now(),
+            bar,
+            done: Vec::new(),
+            best: None,
+            failure: None,
+        })
+    }
+
+    /// Works on pairs until enough is done, and tells.
+    pub(super) fn run<D: Device + Send>(mut self, mut rig: Rig<D>, stop: &AtomicBool) -> Result<(), Failure> {
+        let (tally, result) =
+            live::run(&mut rig.pairs, &rig.optics, stop, |live, tally| self.take(live, tally));
+        self.bar.finish_and_clear();
+        let best = self.make_best().unwrap_or_else(|failure| {
+            self.failure.get_or_insert(failure);
+            None
+        });
+        let failure = result.err().map(Failure::from).or(self.failure.take()).or_else(|| self.nothing());
+        if self.args.json {
+            say_json(&self.as_json(&tally, best.as_ref(), failure.as_ref()))?;
+        } else {
+            say(&self.as_text(&tally, best.as_ref()))?;
+        }
+        failure.map_or(Ok(()), Err)
+    }
+
+    /// One pair.
+    fn take(&mut self, live: Live, tally: &Tally) -> ControlFlow<()> {
+        if self.skip > 0 {
+            self.skip -= 1;
+            return ControlFlow::Continue(());
+        }
+        match self.work_on(live) {
+            Ok(()) => {}
+            Err(failure) => {
+                self.failure = Some(failure);
+                return ControlFlow::Break(());
+            }
+        }
+        self.show(tally);
+        let enough = self.args.frames.is_some_and(|frames| self.done.len() as u64 >= frames)
+            || self.args.seconds.is_some_and(|seconds| self.begun.elapsed().as_secs_f64() >= seconds);
+        if enough { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+
+    /// Records a pair and makes its model. That a pair is refused is no failure.
+    fn work_on(&mut self, live: Live) -> Result<(), Failure> {
+        let Live { views, gap, arrived } = live;
+        if self.args.scene.takes_first() && self.scene.background.is_none() {
+            if let Some(recording) = &mut self.recording {
+                recording.add(0, &views.images)?;
+            }
+            self.scene.background = Some(views.images);
+            self.tell("the background is taken: put the object in its place");
+            return Ok(());
+        }
+        let number = self.done.len() as u64 + 1;
+        let name = format!("{number:06}");
+        if let Some(recording) = &mut self.recording {
+            recording.add(number, &views.images)?;
+        }
+        let result = if self.args.only_record {
+            Ok(Success { size: "recorded".into(), warnings: Vec::new() })
+        } else if self.args.best {
+            self.weigh(views.images, views.warnings.len())
+        } else {
+            let folder = self.args.out.join(&name);
+            self.make(views.images, &folder)
+                .map(|model| Success { size: sides(model.size()), warnings: model.warnings() })
+        };
+        let result = match result {
+            Ok(mut success) => {
+                success.warnings.splice(0..0, views.warnings);
+                Ok(success)
+            }
+            Err(failure) if failure.is::<Refusal>() => Err(words_of(&*failure)),
+            Err(failure) => return Err(failure),
+        };
+        self.done.push(Done { name, result, latency: now().saturating_sub(arrived), gap });
+        Ok(())
+    }
+
+    /// The views as the scene has them, and their calibration.
+    fn seen(&self, views: [GrayImage; 2]) -> Result<([GrayImage; 2], StereoCamera), Failure> {
+        let calibration = self.calibration.as_ref().ok_or(NoCalibration)?;
+        Ok(self.scene.apply(views, calibration)?)
+    }
+
+    /// The model of a pair, in its folder.
+    fn make(&self, views: [GrayImage; 2], folder: &Path) -> Result<Model, Failure> {
+        let (images, calibration) = self.seen(views)?;
+        model::make(Order {
+            images,
+            calibration: &calibration,
+            options: self.options,
+            pictures: !self.args.no_pictures,
+            truth: None,
+            folder,
+        })
+    }
+
+    /// Keeps a pair if it is the best so far; the first of equals stays. So many of its frames were damaged.
+    fn weigh(&mut self, views: [GrayImage; 2], damaged: usize) -> Result<Success, Failure> {
+        let ([left, right], calibration) = self.seen(views.clone())?;
+        let made = reconstruct(left, right, &calibration, self.options, &mut ())?;
+        let warnings = warnings(&made);
+        let rows = made.outcome.rows;
+        let worth = (damaged + warnings.len(), f64::from(rows.unmatched) / f64::from(rows.crossings.max(1)));
+        if self.best.as_ref().is_none_or(|best| worth < best.worth) {
+            self.best = Some(Best { index: self.done.len(), views, worth });
+        }
+        let size = made.mesh.bounds().map_or_else(nalgebra::Vector3::zeros, |[low, high]| high - low);
+        Ok(Success { size: sides(size), warnings })
+    }
+
+    /// Makes the model of the best pair, if that is what is wanted.
+    fn make_best(&mut self) -> Result<Option<(String, Model)>, Failure> {
+        let Some(best) = self.best.take() else { return Ok(None) };
+        let model = self.make(best.views, &self.args.out)?;
+        Ok(Some((self.done[best.index].name.clone(), model)))
+    }
+
+    /// That pairs came, but no model, is a failure.
+    fn nothing(&self) -> Option<Failure> {
+        let mut refused = self.done.iter().map(|done| done.result.as_ref().err());
+        let last = refused.clone().next_back()??;
+        refused.all(|refusal| refusal.is_some()).then(|| {
+            let pairs = count(self.done.len(), "pair", "pairs");
+            format!("none of {pairs} gave a model; the last: {last}").into()
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests;
