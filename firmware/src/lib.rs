@@ -6,5 +6,8 @@
 //! action), `camera/` (sensor drivers over embedded-hal 1.0) and `board/`, which alone may touch registers.
 #![no_std]
 
+#[cfg(target_os = "none")]
+pub mod board;
 pub mod memory;
 pub mod selftest;
+pub mod stages;

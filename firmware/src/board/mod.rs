@@ -1,0 +1,5 @@
+//! Boards, one a feature: registers, interrupts and `unsafe` live here and nowhere else. What a board gives
+//! out is safe, and says nothing of what it does with its parts.
+
+#[cfg(feature = "mps2")]
+pub mod mps2;
