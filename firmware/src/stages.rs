@@ -160,21 +160,20 @@ pub fn device_settings(optics: Optics) -> Settings {
     Settings { sub_pixel: false, thinning: Rule::HitOrMiss, ..Settings::new(optics) }
 }
 
-/// A run the way a device goes it: both outlines, the left skeleton, the pair.
+/// A run the way a device goes it: the left picture, its skeleton, the right picture, the pair.
 ///
 /// # Errors
 /// What the core refuses.
 pub fn run(
     memory: &mut Memory<'_>,
-    pictures: [Grey<'_>; 2],
+    [left, right]: [Grey<'_>; 2],
     settings: &Settings,
     observer: &mut impl Observer,
 ) -> Result<Outcome, Finding> {
     let mut run = Run::new(memory, settings);
-    for (side, picture) in [Side::Left, Side::Right].into_iter().zip(pictures) {
-        let eye = &mut memory.eyes[side as usize];
-        run.outline(side, picture, eye, Arena::new(memory.scratch), observer)?;
-    }
-    run.skeleton(Side::Left, &mut memory.eyes[0], Arena::new(memory.scratch), observer)?;
+    let [left_eye, right_eye] = &mut memory.eyes;
+    run.outline(Side::Left, left, left_eye, Arena::new(memory.scratch), observer)?;
+    run.skeleton(Side::Left, left_eye, Arena::new(memory.scratch), observer)?;
+    run.outline(Side::Right, right, right_eye, Arena::new(memory.scratch), observer)?;
     run.pair(memory, observer)
 }

@@ -1,5 +1,7 @@
 //! Independent oracles: naive twins, shapes with known truth, a mesh checker.
 
+pub mod board;
+pub mod cases;
 pub mod core;
 pub mod graph;
 pub mod matching;
