@@ -8,6 +8,9 @@
 
 #[cfg(target_os = "none")]
 pub mod board;
+pub mod camera;
 pub mod memory;
+pub mod ports;
+pub mod record;
 pub mod selftest;
 pub mod stages;

@@ -2,11 +2,10 @@
 //! device goes it, one picture at a time.
 
 use crate::memory::Storage;
-use crate::stages::device_settings;
 use shared::arena::Arena;
 use shared::bitmap::{Grey, Size};
 use shared::fixed::PX;
-use shared::pipeline::{Finding, Run, Side};
+use shared::pipeline::{Finding, Run, Settings, Side};
 use shared::stage::depth::Optics;
 
 /// Disparity of the drawn ring, px.
@@ -28,7 +27,7 @@ fn draw_ring(size: Size, u: i32, picture: &mut [u8]) {
 pub fn run<S: Storage>(storage: &mut S) -> Result<i32, Finding> {
     let size = S::CAPACITIES.size;
     let optics = Optics { focal: 400 * PX, disparity_offset: 0 };
-    let settings = device_settings(optics);
+    let settings = Settings::device(optics);
     let mut memory = storage.lend();
     let mut run = Run::new(&mut memory, &settings);
     for (side, u) in [(Side::Left, 90), (Side::Right, 90 - DISPARITY)] {

@@ -10,8 +10,6 @@ use shared::arena::Arena;
 use shared::bitmap::{Bitmap, Grey};
 use shared::pipeline::{Finding, Memory, Observer, Outcome, Product, Run, Settings, Side};
 use shared::stage::branch::Sample;
-use shared::stage::depth::Optics;
-use shared::stage::thinning::Rule;
 
 /// Counts instructions or cycles.
 pub trait Counter {
@@ -153,11 +151,6 @@ impl fmt::Write for Sum {
         self.0.update(text.as_bytes());
         Ok(())
     }
-}
-
-/// The settings of a device: contours of the mask alone, and thinning without a list of all pixels.
-pub fn device_settings(optics: Optics) -> Settings {
-    Settings { sub_pixel: false, thinning: Rule::HitOrMiss, ..Settings::new(optics) }
 }
 
 /// A run the way a device goes it: the left picture, its skeleton, the right picture, the pair.

@@ -275,13 +275,13 @@ pub(crate) fn settings(camera: &RectifiedCamera, options: &Options) -> Settings 
 
 fn core_settings(optics: Optics, options: &Options) -> Settings {
     let chosen = match options.mode {
+        Mode::Default if options.profile == Profile::Device => Settings::device(optics),
         Mode::Default => Settings::new(optics),
         Mode::Paper { omega } => Settings::paper(optics, PaperMatching { omega, ..PaperMatching::default() }),
     };
     Settings {
         threshold: options.threshold,
         polarity: options.polarity,
-        sub_pixel: options.profile == Profile::Full,
         thinning: options.thinning.unwrap_or(chosen.thinning),
         pruning: options.branches.map_or(chosen.pruning, Pruning::Branches),
         ..chosen

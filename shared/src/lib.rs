@@ -15,3 +15,6 @@ pub mod camera;
 // What happens to a picture.
 pub mod stage;
 pub mod pipeline;
+
+// What of it goes over a link.
+pub mod wire;

@@ -1,5 +1,5 @@
-//! The house's plan, held against the source: data flows one way, the core is `no_std` integers, and
-//! `unsafe` stays where registers are.
+//! The house's plan, held against the source: data flows one way, the core is `no_std` integers but for the
+//! camera model, and `unsafe` stays where registers are.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -91,21 +91,27 @@ fn only_the_pipeline_chains_stages() {
         .flat_map(|file| stage_uses(&code(file)))
         .map(|(stage, _)| stage)
         .collect();
-    for name in stages(&folder.join("mod.rs")).iter().filter(|n| *n != "invariants") {
+    // Hulls call their invariants, and whoever has raw pictures resamples them before the chain begins.
+    for name in
+        stages(&folder.join("mod.rs")).iter().filter(|n| !["invariants", "warp"].contains(&n.as_str()))
+    {
         assert!(chained.contains(name), "nobody runs {name}");
     }
 }
 
 #[test]
-fn the_core_has_no_std_no_alloc_and_no_floats() {
+fn the_core_has_no_std_no_alloc_and_floats_only_in_the_camera_model() {
     let library = fs::read_to_string(root().join("shared/src/lib.rs")).unwrap();
     assert!(library.contains("#![no_std]") && library.contains("#![forbid(unsafe_code)]"));
     for file in rust_files(&root().join("shared/src")) {
+        let model = file.ends_with("shared/src/camera.rs");
         for word in words(&code(&file)) {
-            let banned = ["std", "alloc", "f32", "f64", "unsafe"].contains(&word);
+            let banned = ["std", "alloc", "unsafe"].contains(&word);
             assert!(!banned, "{} says {word}", file.display());
-            let float = word.contains("f32") || word.contains("f64");
-            assert!(!float, "{} has the number {word}", file.display());
+            // One format, one order of operations, and no functions but those of software.
+            let float = word.contains("f32") || word.contains("f64") || ["nalgebra", "libm"].contains(&word);
+            let fused = word.contains("f32") || word.contains("mul_add") || word == "fma";
+            assert!(if model { !fused } else { !float }, "{} says {word}", file.display());
         }
     }
 }

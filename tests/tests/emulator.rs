@@ -6,7 +6,7 @@
 //! take one picture after the other in the memory that the firmware has. Says loudly when QEMU is not there,
 //! and fails then if `CI=true`. With `-- --nocapture` it also says what each stage costs.
 
-use firmware::stages::{Stages, device_settings};
+use firmware::stages::Stages;
 use host::calibration::StereoCamera;
 use host::shape::Shape;
 use host::stage::rectify::Rectification;
@@ -86,7 +86,7 @@ fn all_cases() -> Vec<Case> {
 
 /// What the PC makes of a case: a line a stage.
 fn on_the_pc(case: &Case) -> Vec<String> {
-    let settings = if case.as_device { device_settings(case.optics) } else { Settings::new(case.optics) };
+    let settings = if case.as_device { Settings::device(case.optics) } else { Settings::new(case.optics) };
     let rows = |image: &GrayImage| -> Picture {
         image.as_raw().chunks(image.width() as usize).map(<[u8]>::to_vec).collect()
     };

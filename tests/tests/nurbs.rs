@@ -228,7 +228,7 @@ fn radii_are_floored_and_lent_memory_is_respected() {
     let samples = wave(300, false, 40.0, 1);
     let mut few = List::<Control, 5>::new();
     for (words, what, limit) in
-        [(500, "control points", 5), (60, "entries of a fit", 8), (8, "control points of a fit", 2)]
+        [(500, "control points", 5), (300, "entries of a fit", 120), (8, "control points of a fit", 2)]
     {
         let mut block = vec![7; words];
         let scratch = Arena::new(&mut block);

@@ -11,7 +11,7 @@ mod board {
     use core::ffi::CStr;
     use firmware::board::mps2::{Board, Timer};
     use firmware::memory::{Capacities, Qvga, Storage, Vga};
-    use firmware::stages::{Stages, device_settings, run};
+    use firmware::stages::{Stages, run};
     use semihosting::experimental::env::args;
     use semihosting::fs::File;
     use semihosting::io::Read;
@@ -57,7 +57,7 @@ mod board {
     }
 
     fn settings(header: &Header) -> Settings {
-        if header.as_device { device_settings(header.optics) } else { Settings::new(header.optics) }
+        if header.as_device { Settings::device(header.optics) } else { Settings::new(header.optics) }
     }
 
     fn observe(number: usize, memory: &mut Memory<'_>, pair: [Grey<'_>; 2], header: &Header, timer: &Timer) {

@@ -83,6 +83,23 @@ impl Camera {
         if calibrated == images { Ok(()) } else { Err(CalibrationError::Size { calibrated, images }) }
     }
 
+    /// The camera of images whose pixels are the means of 2x2 of this one's; a last odd column or row is
+    /// left out. Pixel 0 of these lies at 0.5, so c' = (c + 0.5) / 2 - 0.5.
+    #[must_use]
+    pub fn halved(&self) -> Self {
+        let halfway = |c: f64| (c + 0.5) / 2.0 - 0.5;
+        Self {
+            width: self.width / 2,
+            height: self.height / 2,
+            fx: self.fx / 2.0,
+            fy: self.fy / 2.0,
+            cx: halfway(self.cx),
+            cy: halfway(self.cy),
+            skew: self.skew / 2.0,
+            distortion: self.distortion,
+        }
+    }
+
     /// From a camera matrix, which stands at `source`, and a lens.
     fn new(
         (width, height): (u32, u32),
@@ -134,6 +151,12 @@ impl StereoCamera {
             rotation: Matrix3::identity(),
             translation: Vector3::new(-baseline_mm, 0.0, 0.0),
         }
+    }
+
+    /// The pair of images reduced to half, see [`Camera::halved`].
+    #[must_use]
+    pub fn halved(&self) -> Self {
+        Self { left: self.left.halved(), right: self.right.halved(), ..*self }
     }
 
     /// Reads an OpenCV file or a Kalibr camchain; or a pair of files, written `left.yaml,right.yaml` or

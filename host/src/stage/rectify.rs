@@ -21,16 +21,24 @@
 //! background stays plain, and an object that touches the border of its image reaches that of the canvas.
 //!
 //! Cost: a rotation, a lens model and four reads for each pixel of each eye, rows in parallel.
+//!
+//! A device cannot choose its canvas by the object, nor evaluate a lens for each pixel. Its canvas is that
+//! of [`Rectification::same_size`], its description [`Rectification::model`], and its pictures, to the bit,
+//! are those of [`Rectification::device_images`]; `shared::stage::warp` says how it makes them.
 
 mod canvas;
+mod device;
 mod resample;
 
 use std::fmt;
 
 use image::GrayImage;
 use nalgebra::{Matrix3, Point2, Point3, Rotation3, Vector3};
+use shared::camera::CameraError;
+use shared::limits::CapacityError;
 
 use crate::calibration::{CalibrationError, Camera, StereoCamera};
+use canvas::Canvas;
 
 /// Longest side of a rectified image, px: coordinates of 1/16 px still fit 16 bits with a sign.
 pub const MAX_SIDE: u32 = 2047;
@@ -93,6 +101,15 @@ pub enum RectifyError {
         /// The camera.
         eye: Eye,
     },
+    /// No row of the canvas is seen by both eyes.
+    #[error("the cameras look past one another, one above the other; turn them until both see the object")]
+    Apart,
+    /// The model of the pair is beyond what a device takes.
+    #[error(transparent)]
+    Device(#[from] CameraError),
+    /// The pictures are beyond what a device takes.
+    #[error(transparent)]
+    Capacity(#[from] CapacityError),
 }
 
 /// The virtual pair of pinholes: parallel axes, one focal length, one row for every point.
@@ -208,7 +225,7 @@ impl Rectification {
     ///
     /// When the cameras do not stand side by side, or a lens model cannot be inverted at the object.
     pub fn around(pair: &StereoCamera, object: [PixelBox; 2]) -> Result<Self, RectifyError> {
-        Self::new(pair, object, 0.5)
+        Self::new(pair, |eyes| canvas::fit(eyes, object, 0.5))
     }
 
     /// A canvas that holds all of both raw images.
@@ -217,14 +234,24 @@ impl Rectification {
     ///
     /// As [`Self::around`]; strong lenses are often not invertible in the corners.
     pub fn whole(pair: &StereoCamera) -> Result<Self, RectifyError> {
-        let all = |camera: &Camera| PixelBox {
-            min: Point2::origin(),
-            max: Point2::new(f64::from(camera.width) - 1.0, f64::from(camera.height) - 1.0),
-        };
-        Self::new(pair, [all(&pair.left), all(&pair.right)], 0.0)
+        Self::new(pair, |eyes| canvas::fit(eyes, [whole(&pair.left), whole(&pair.right)], 0.0))
     }
 
-    fn new(pair: &StereoCamera, boxes: [PixelBox; 2], margin: f64) -> Result<Self, RectifyError> {
+    /// A canvas of the size of the left raw image: what a device has, which does not know the object when
+    /// it is told the calibration. It holds the middles of the sides of both raw images, across by columns
+    /// of their own, and down as far as both see; a bent lens sees more in its corners, which is lost.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::around`], and [`RectifyError::Apart`].
+    pub fn same_size(pair: &StereoCamera) -> Result<Self, RectifyError> {
+        Self::new(pair, canvas::same_size)
+    }
+
+    fn new(
+        pair: &StereoCamera,
+        lay: impl FnOnce(&[Turned; 2]) -> Result<Canvas, RectifyError>,
+    ) -> Result<Self, RectifyError> {
         pair.check()?;
         if let Some(camera) = already_rectified(pair) {
             return Ok(Self { camera, source: *pair, eyes: None });
@@ -234,7 +261,7 @@ impl Rectification {
             Turned { eye: Eye::Left, camera: pair.left, turn: left_turn },
             Turned { eye: Eye::Right, camera: pair.right, turn: right_turn },
         ];
-        let canvas = canvas::fit(&eyes, boxes, margin)?;
+        let canvas = lay(&eyes)?;
         let camera = RectifiedCamera {
             width: canvas.width,
             height: canvas.height,
@@ -278,14 +305,17 @@ impl Rectification {
     ///
     /// [`CalibrationError::Size`] when the images are not those that the calibration is for.
     pub fn images(&self, left: GrayImage, right: GrayImage) -> Result<[GrayImage; 2], RectifyError> {
-        for (camera, image) in [(&self.source.left, &left), (&self.source.right, &right)] {
-            camera.check_size(image.width(), image.height())?;
-        }
+        self.check_sizes([&left, &right])?;
         let Some([left_eye, right_eye]) = &self.eyes else { return Ok([left, right]) };
         let resampled = |eye: &Turned, image: &GrayImage| {
             resample::resample(eye, &self.camera, self.column_of_axis(eye.eye), image)
         };
         Ok([resampled(left_eye, &left), resampled(right_eye, &right)])
+    }
+
+    fn check_sizes(&self, [left, right]: [&GrayImage; 2]) -> Result<(), CalibrationError> {
+        self.source.left.check_size(left.width(), left.height())?;
+        self.source.right.check_size(right.width(), right.height())
     }
 
     fn turned(&self, eye: Eye) -> Option<&Turned> {
@@ -297,6 +327,14 @@ impl Rectification {
             Eye::Left => self.camera.cx,
             Eye::Right => self.camera.cx_right,
         }
+    }
+}
+
+/// All of a camera's image.
+fn whole(camera: &Camera) -> PixelBox {
+    PixelBox {
+        min: Point2::origin(),
+        max: Point2::new(f64::from(camera.width) - 1.0, f64::from(camera.height) - 1.0),
     }
 }
 

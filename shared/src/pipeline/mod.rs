@@ -101,6 +101,12 @@ impl Settings {
         }
     }
 
+    /// What a small device does: contours of the mask alone, and a thinning rule that needs no order of the
+    /// pixels, so that a block of scratch of twice the picture is enough.
+    pub fn device(optics: Optics) -> Self {
+        Self { sub_pixel: false, thinning: Rule::HitOrMiss, ..Self::new(optics) }
+    }
+
     /// As literally as the paper's prose allows; branches shorter than 10 px are pruned.
     pub fn paper(optics: Optics, matching: PaperMatching) -> Self {
         Self {

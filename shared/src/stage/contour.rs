@@ -75,6 +75,9 @@ const REACH: usize = 2;
 /// Grey levels by which object and background must differ for an edge to be placed by them.
 const MIN_CONTRAST: i32 = 8;
 
+/// Fewest points of a loop.
+pub(crate) const MIN_LOOP: usize = 8;
+
 /// k g(k) of a Gaussian of 1.5 px, in 1/64: the derivative that gives tangents.
 const TANGENT: [i32; 5] = [51, 53, 26, 7, 1];
 
@@ -208,7 +211,7 @@ fn resample(
         hypot(b.u - a.u, b.v - a.v)
     };
     let length: i64 = (0..crossings.len()).map(|i| i64::from(segment(i))).sum();
-    let len = (length / i64::from(PX)).max(8);
+    let len = (length / i64::from(PX)).max(MIN_LOOP as i64);
     let here = ContourLoop { start: points.len(), len: len as usize };
     let (mut i, mut before) = (0, 0i64);
     for k in 0..len {
@@ -222,13 +225,19 @@ fn resample(
         push(points, point, "contour points")?;
     }
     for i in here.range() {
-        let tangent = TANGENT.iter().zip(1..).fold((0, 0), |(u, v), (weight, k)| {
-            let (a, b) = (points[here.step(i, -k)].at, points[here.step(i, k)].at);
-            (u + weight * (b.u - a.u), v + weight * (b.v - a.v))
-        });
-        points[i].normal = Direction::of(tangent.1, -tangent.0).unwrap_or_default();
+        let normal = normal(here, i, |k| points[k].at);
+        points[i].normal = normal;
     }
     push(loops, here, "contour loops")
+}
+
+/// Outward normal at point `i` of a loop, given where its points are, within +-2^20.
+pub(crate) fn normal(l: ContourLoop, i: usize, at: impl Fn(usize) -> PixelPoint) -> Direction {
+    let (u, v) = TANGENT.iter().zip(1..).fold((0, 0), |(u, v), (weight, k)| {
+        let (a, b) = (at(l.step(i, -k)), at(l.step(i, k)));
+        (u + weight * (b.u - a.u), v + weight * (b.v - a.v))
+    });
+    Direction::of(v, -u).unwrap_or_default()
 }
 
 /// The contour's highest point and its lowest: `(top, bottom)`.

@@ -1,6 +1,9 @@
 //! The stages, in the order in which data flows through them. A stage may use the foundation and the
 //! output type of an earlier stage, never a later one; only `pipeline` names more than one neighbour.
 
+// One eye, from raw to rectified.
+pub mod warp;
+
 // One eye, in pixels.
 pub mod binarise;
 pub mod clean;

@@ -50,6 +50,12 @@ pub struct ContourMatch {
     pub normal_right: Direction,
 }
 
+/// The weight of a match away from the image's border, given its right normal.
+pub(crate) const fn weight_across(normal_right: Direction) -> u16 {
+    let across = normal_right.u as i32;
+    ((across * across) >> 14) as u16
+}
+
 /// A match that the rest of its loop is filled from.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
@@ -363,8 +369,7 @@ fn fill(
             let mix = |a: i32, b: i32| a + div_round(i64::from(b - a) * s as i64, gap as i64) as i32;
             matches[i].disparity = plane.at(left[i].at) + mix(behind.0, ahead.0);
             matches[i].normal_right = left[i].normal.turned(mix(behind.1, ahead.1));
-            let across = i32::from(matches[i].normal_right.u);
-            matches[i].weight = if left[i].border { 0 } else { ((across * across) >> 14) as u16 };
+            matches[i].weight = if left[i].border { 0 } else { weight_across(matches[i].normal_right) };
         }
         (from, behind) = (t.index as usize, ahead);
     }

@@ -4,6 +4,7 @@ pub mod board;
 pub mod cases;
 pub mod core;
 pub mod graph;
+pub mod link;
 pub mod matching;
 pub mod mesh_checker;
 pub mod nurbs;

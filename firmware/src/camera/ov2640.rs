@@ -1,0 +1,106 @@
+//! The sensor OV2640 on its control bus.
+//!
+//! The bus is SCCB: I2C without repeated starts, so that a read is a write of the address and then a read of
+//! its own. The sensor's address is fixed: two of them have a bus each, or share one. What is written to a
+//! shared bus reaches both, and what is read is the AND of both; so both are written alike, one after the
+//! other, and nothing here depends on which of them answers.
+
+use super::registers::{
+    BANK, BARS, Bank, COM7, PRODUCT_HIGH, PRODUCT_LOW, RESET, SVGA, TABLE, WITNESSES, Write, exposure,
+};
+use crate::ports::{CameraFault, Exposure};
+use embedded_hal::i2c::I2c;
+
+/// Where every OV2640 answers, 7 bits.
+pub const ADDRESS: u8 = 0x30;
+/// Product numbers of the OV2640.
+pub const PRODUCTS: [u16; 2] = [0x2641, 0x2642];
+/// How long a reset takes, ms.
+pub const RESET_MS: u32 = 100;
+/// Frames that a change takes to be seen, as time: two of the slowest, ms.
+pub const SETTLE_MS: u32 = 150;
+
+/// A sensor.
+#[derive(Debug)]
+pub struct Sensor<I> {
+    bus: I,
+}
+
+impl<I: I2c> Sensor<I> {
+    /// The sensor behind a bus.
+    pub const fn new(bus: I) -> Self {
+        Self { bus }
+    }
+
+    /// Its product number.
+    ///
+    /// # Errors
+    /// A silent bus; another sensor.
+    pub fn identify(&mut self) -> Result<u16, CameraFault> {
+        self.choose(Bank::Sensor)?;
+        let product = u16::from_be_bytes([self.register(PRODUCT_HIGH)?, self.register(PRODUCT_LOW)?]);
+        if PRODUCTS.contains(&product) { Ok(product) } else { Err(CameraFault::Identity(product)) }
+    }
+
+    /// Forget everything; deaf for [`RESET_MS`].
+    ///
+    /// # Errors
+    /// A silent bus.
+    pub fn reset(&mut self) -> Result<(), CameraFault> {
+        self.choose(Bank::Sensor)?;
+        self.write((COM7, RESET))
+    }
+
+    /// From a reset to pictures of QVGA YUV422; they need an exposure too.
+    ///
+    /// # Errors
+    /// A silent bus; a register that did not keep its value.
+    pub fn set_up(&mut self) -> Result<(), CameraFault> {
+        for &(bank, writes) in TABLE {
+            self.choose(bank)?;
+            writes.iter().try_for_each(|&write| self.write(write))?;
+        }
+        for &(bank, (address, value)) in WITNESSES {
+            self.choose(bank)?;
+            let read = self.register(address)?;
+            if read != value {
+                return Err(CameraFault::Register { address, read });
+            }
+        }
+        Ok(())
+    }
+
+    /// Fix exposure and gain; pictures have them after [`SETTLE_MS`].
+    ///
+    /// # Errors
+    /// A silent bus.
+    pub fn expose(&mut self, order: Exposure) -> Result<(), CameraFault> {
+        self.choose(Bank::Sensor)?;
+        exposure(order).into_iter().try_for_each(|write| self.write(write))
+    }
+
+    /// Show colour bars, or what is seen; pictures do after [`SETTLE_MS`].
+    ///
+    /// # Errors
+    /// A silent bus.
+    pub fn show_bars(&mut self, on: bool) -> Result<(), CameraFault> {
+        self.choose(Bank::Sensor)?;
+        self.write((COM7, if on { SVGA | BARS } else { SVGA }))
+    }
+
+    fn choose(&mut self, bank: Bank) -> Result<(), CameraFault> {
+        self.write((BANK, bank as u8))
+    }
+
+    fn write(&mut self, (address, value): Write) -> Result<(), CameraFault> {
+        self.bus.write(ADDRESS, &[address, value]).map_err(|_| CameraFault::ControlBus)
+    }
+
+    fn register(&mut self, address: u8) -> Result<u8, CameraFault> {
+        let mut value = [0];
+        self.bus.write(ADDRESS, &[address]).map_err(|_| CameraFault::ControlBus)?;
+        self.bus.read(ADDRESS, &mut value).map_err(|_| CameraFault::ControlBus)?;
+        let [value] = value;
+        Ok(value)
+    }
+}

@@ -1,0 +1,385 @@
+//! What a device says to its host. Layouts stand in docs/wire-format.md.
+
+use super::bytes::Reader;
+use super::finding::{read_finding, write_finding};
+use super::frame::{Frame, Writer};
+use super::picture::PicturePart;
+use super::shape::{Shape, ShapeLists};
+use super::{VERSION, WireError};
+use crate::limits::CapacityError;
+use crate::pipeline::Finding;
+
+/// A message from a device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ToHost<'a> {
+    /// Who it is; the first message after a reset, and the answer to a hello.
+    Hello(Hello<'a>),
+    /// What became of a pair of pictures.
+    Pair(PairReport<'a>),
+    /// Rows of a picture that was asked for.
+    Picture(PicturePart<'a>),
+    /// How it fares.
+    Health(Health),
+    /// What became of a command.
+    Answer(Answer),
+}
+
+/// Longest name of a board, bytes.
+pub const MAX_BOARD: usize = 32;
+
+/// Who a device is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Hello<'a> {
+    /// Version of the firmware, as in 1.2.3.
+    pub firmware: [u16; 3],
+    /// Name of the board, at most [`MAX_BOARD`] bytes.
+    pub board: &'a str,
+    /// What the left and the right image sensor say that they are; 0 for one that is silent.
+    pub sensors: [u32; 2],
+    /// Width and height of the pictures, px.
+    pub picture: [u16; 2],
+    /// How much a shape may have.
+    pub capacities: Capacities,
+    /// Why it started.
+    pub reset: ResetReason,
+    /// [`calibration_crc`](super::calibration_crc) of the calibration that it keeps, if there is one.
+    pub calibration: Option<u32>,
+}
+
+/// How much a shape may have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Capacities {
+    /// Contour points.
+    pub contour: u16,
+    /// Branches.
+    pub branches: u16,
+    /// Control points of all branches.
+    pub controls: u16,
+}
+
+/// Declares an enum whose variants are sent as codes.
+macro_rules! codes {
+    ($(#[$meta:meta])* $name:ident, $what:literal: $($(#[$doc:meta])* $variant:ident = $code:literal),+) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum $name {
+            $($(#[$doc])* $variant = $code),+
+        }
+
+        impl $name {
+            const fn of(code: u8) -> Result<Self, WireError> {
+                match code {
+                    $($code => Ok(Self::$variant),)+
+                    code => Err(WireError::Unknown { what: $what, code }),
+                }
+            }
+        }
+    };
+}
+
+codes! {
+    /// Why a device started.
+    ResetReason, "reset reason":
+    /// None that it could tell.
+    Unknown = 0,
+    /// It was switched on.
+    Power = 1,
+    /// The reset pin.
+    Pin = 2,
+    /// It hung and the watchdog bit.
+    Watchdog = 3,
+    /// It was told to.
+    Software = 4,
+    /// The supply voltage broke down.
+    BrownOut = 5
+}
+
+codes! {
+    /// Why a command was not obeyed; 0 is none.
+    ErrorCode, "error code":
+    /// It is of a type that this firmware does not know.
+    UnknownCommand = 1,
+    /// It could not be read.
+    Malformed = 2,
+    /// It speaks another version of the format.
+    Version = 3,
+    /// Its values are outside what this device can do.
+    OutOfRange = 4,
+    /// Not while another one is under way.
+    Busy = 5,
+    /// The calibration could not be stored or erased.
+    Storage = 6,
+    /// A camera does not answer.
+    Camera = 7
+}
+
+/// How a picture was taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Exposure {
+    /// Time, lines of the sensor.
+    pub lines: u16,
+    /// Gain, 1/256.
+    pub gain: u16,
+}
+
+/// What became of a pair of pictures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PairReport<'a> {
+    /// Its number since the device started.
+    pub number: u32,
+    /// When the left and the right picture began, us since the device started.
+    pub stamps: [u64; 2],
+    /// Levels between object and background, 0 in an eye that was not looked at.
+    pub levels: [u8; 2],
+    /// How both pictures were taken.
+    pub exposures: [Exposure; 2],
+    /// What the core made of it, or why it refused.
+    pub result: Result<Shape<'a>, Finding>,
+}
+
+impl PairReport<'_> {
+    /// How much later the right picture began than the left one, us.
+    pub const fn gap(&self) -> i64 {
+        self.stamps[1].wrapping_sub(self.stamps[0]).cast_signed()
+    }
+}
+
+/// How a device fares; counters since it started, but for the last one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Health {
+    /// Time since it started, ms.
+    pub uptime: u64,
+    /// Pairs that went through the core.
+    pub pairs: u32,
+    /// Those that it refused.
+    pub refused: u32,
+    /// Pictures that were dropped before.
+    pub dropped: u32,
+    /// Pictures that did not come in time.
+    pub timeouts: u32,
+    /// Times that a camera was started anew.
+    pub restarts: u32,
+    /// Bytes from the host that were no frame.
+    pub rejected_bytes: u32,
+    /// Frames from the host that could not be used.
+    pub rejected_frames: u32,
+    /// Times that the watchdog bit since it was switched on.
+    pub watchdog_resets: u32,
+}
+
+/// What became of a command.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Answer {
+    /// The sequence number of the command's frame.
+    pub command: u16,
+    /// It was obeyed, or why not.
+    pub result: Result<(), ErrorCode>,
+}
+
+const HELLO: u8 = 0x01;
+const PAIR: u8 = 0x02;
+const PICTURE: u8 = 0x03;
+const HEALTH: u8 = 0x04;
+const ANSWER: u8 = 0x05;
+
+impl<'a> ToHost<'a> {
+    /// Write the message as a frame and return its length. A shape that does not fit is not sent in part:
+    /// the pair is then reported as refused for [`Finding::Capacity`].
+    ///
+    /// # Errors
+    /// A [`CapacityError`] when `out` is too short even so, and for a board's name that is too long.
+    pub fn encode(&self, sequence: u16, out: &mut [u8]) -> Result<usize, CapacityError> {
+        match (self.encode_whole(sequence, out), self) {
+            (Err(error), Self::Pair(pair)) if pair.result.is_ok() => {
+                let refused = PairReport { result: Err(Finding::Capacity(error)), ..*pair };
+                Self::Pair(refused).encode_whole(sequence, out)
+            }
+            (done, _) => done,
+        }
+    }
+
+    fn encode_whole(&self, sequence: u16, out: &mut [u8]) -> Result<usize, CapacityError> {
+        let kind = match self {
+            Self::Hello(_) => HELLO,
+            Self::Pair(_) => PAIR,
+            Self::Picture(_) => PICTURE,
+            Self::Health(_) => HEALTH,
+            Self::Answer(_) => ANSWER,
+        };
+        let mut writer = Writer::new(kind, sequence, out);
+        match self {
+            Self::Hello(hello) => hello.write(&mut writer)?,
+            Self::Pair(pair) => pair.write(&mut writer)?,
+            Self::Picture(part) => part.write(&mut writer)?,
+            Self::Health(health) => health.write(&mut writer),
+            Self::Answer(answer) => answer.write(&mut writer),
+        }
+        writer.finish()
+    }
+
+    /// Read a frame. A shape goes into `lists`, and whatever they held is lost then.
+    ///
+    /// # Errors
+    /// A [`WireError`] that says what is wrong with the message.
+    pub fn decode(frame: &Frame<'a>, lists: &'a mut ShapeLists<'_>) -> Result<Self, WireError> {
+        let mut reader = Reader::new(frame.payload);
+        Ok(match frame.kind {
+            HELLO => Self::Hello(Hello::read(&mut reader)?),
+            PAIR => Self::Pair(PairReport::read(&mut reader, lists)?),
+            PICTURE => Self::Picture(PicturePart::read(&mut reader)?),
+            HEALTH => Self::Health(Health::read(&mut reader)?),
+            ANSWER => Self::Answer(Answer::read(&mut reader)?),
+            code => return Err(WireError::Unknown { what: "message type", code }),
+        })
+    }
+}
+
+impl<'a> Hello<'a> {
+    fn write(&self, writer: &mut Writer<'_>) -> Result<(), CapacityError> {
+        if self.board.len() > MAX_BOARD {
+            return Err(CapacityError { what: "bytes in a board's name", limit: MAX_BOARD });
+        }
+        writer.u16(VERSION);
+        for x in self.firmware {
+            writer.u16(x);
+        }
+        writer.u8(self.board.len() as u8);
+        writer.put(self.board.as_bytes());
+        for x in self.sensors {
+            writer.u32(x);
+        }
+        for x in self.picture {
+            writer.u16(x);
+        }
+        writer.u16(self.capacities.contour);
+        writer.u16(self.capacities.branches);
+        writer.u16(self.capacities.controls);
+        writer.u8(self.reset as u8);
+        writer.flag(self.calibration.is_some());
+        writer.u32(self.calibration.unwrap_or(0));
+        Ok(())
+    }
+
+    fn read(reader: &mut Reader<'a>) -> Result<Self, WireError> {
+        check_version(reader)?;
+        let firmware = [reader.u16()?, reader.u16()?, reader.u16()?];
+        let length = usize::from(reader.u8()?);
+        let board = core::str::from_utf8(reader.take(length)?).ok().filter(|name| name.len() <= MAX_BOARD);
+        let board = board.ok_or(WireError::Invalid("name of a board"))?;
+        let sensors = [reader.u32()?, reader.u32()?];
+        let picture = [reader.u16()?, reader.u16()?];
+        let capacities =
+            Capacities { contour: reader.u16()?, branches: reader.u16()?, controls: reader.u16()? };
+        let reset = ResetReason::of(reader.u8()?)?;
+        let stored = reader.flag("calibration")?;
+        let calibration = Some(reader.u32()?).filter(|_| stored);
+        Ok(Self { firmware, board, sensors, picture, capacities, reset, calibration })
+    }
+}
+
+/// Read the version of a hello.
+pub(super) fn check_version(reader: &mut Reader<'_>) -> Result<(), WireError> {
+    match reader.u16()? {
+        VERSION => Ok(()),
+        theirs => Err(WireError::Version { theirs }),
+    }
+}
+
+impl<'a> PairReport<'a> {
+    fn write(&self, writer: &mut Writer<'_>) -> Result<(), CapacityError> {
+        writer.u32(self.number);
+        for x in self.stamps {
+            writer.u64(x);
+        }
+        for x in self.levels {
+            writer.u8(x);
+        }
+        for exposure in &self.exposures {
+            exposure.write(writer);
+        }
+        match &self.result {
+            Ok(shape) => {
+                writer.flag(true);
+                shape.write(writer)
+            }
+            Err(finding) => {
+                writer.flag(false);
+                write_finding(finding, writer);
+                Ok(())
+            }
+        }
+    }
+
+    fn read(reader: &mut Reader<'_>, lists: &'a mut ShapeLists<'_>) -> Result<Self, WireError> {
+        let number = reader.u32()?;
+        let stamps = [reader.u64()?, reader.u64()?];
+        let levels = [reader.u8()?, reader.u8()?];
+        let exposures = [Exposure::read(reader)?, Exposure::read(reader)?];
+        let result = if reader.flag("result of a pair")? {
+            lists.read(reader)?;
+            Ok(lists.shape())
+        } else {
+            Err(read_finding(reader)?)
+        };
+        Ok(Self { number, stamps, levels, exposures, result })
+    }
+}
+
+impl Exposure {
+    pub(super) fn write(self, writer: &mut Writer<'_>) {
+        writer.u16(self.lines);
+        writer.u16(self.gain);
+    }
+
+    pub(super) fn read(reader: &mut Reader<'_>) -> Result<Self, WireError> {
+        Ok(Self { lines: reader.u16()?, gain: reader.u16()? })
+    }
+}
+
+impl Health {
+    fn write(&self, writer: &mut Writer<'_>) {
+        writer.u64(self.uptime);
+        for counter in [
+            self.pairs,
+            self.refused,
+            self.dropped,
+            self.timeouts,
+            self.restarts,
+            self.rejected_bytes,
+            self.rejected_frames,
+            self.watchdog_resets,
+        ] {
+            writer.u32(counter);
+        }
+    }
+
+    fn read(reader: &mut Reader<'_>) -> Result<Self, WireError> {
+        Ok(Self {
+            uptime: reader.u64()?,
+            pairs: reader.u32()?,
+            refused: reader.u32()?,
+            dropped: reader.u32()?,
+            timeouts: reader.u32()?,
+            restarts: reader.u32()?,
+            rejected_bytes: reader.u32()?,
+            rejected_frames: reader.u32()?,
+            watchdog_resets: reader.u32()?,
+        })
+    }
+}
+
+impl Answer {
+    fn write(self, writer: &mut Writer<'_>) {
+        writer.u16(self.command);
+        writer.u8(self.result.map_or_else(|error| error as u8, |()| 0));
+    }
+
+    fn read(reader: &mut Reader<'_>) -> Result<Self, WireError> {
+        let command = reader.u16()?;
+        let result = match reader.u8()? {
+            0 => Ok(()),
+            code => Err(ErrorCode::of(code)?),
+        };
+        Ok(Self { command, result })
+    }
+}
