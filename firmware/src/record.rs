@@ -152,3 +152,124 @@ impl<F: NorFlash> Flash for Record<F> {
         self.write(start, &header)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use embedded_storage::nor_flash::{ErrorType, NorFlashErrorKind, ReadNorFlash};
+    extern crate std;
+    use std::vec;
+    use std::vec::Vec;
+
+    /// Flash that loses power in the middle of its `fuse`-th write or erasure. Writing clears bits and sets
+    /// none, as on a real chip.
+    #[derive(Clone, Debug)]
+    struct Model {
+        bytes: Vec<u8>,
+        fuse: usize,
+    }
+
+    impl Model {
+        fn changes(&mut self, all: usize) -> (usize, Result<(), NorFlashErrorKind>) {
+            self.fuse = self.fuse.saturating_sub(1);
+            if self.fuse == 0 { (all / 2, Err(NorFlashErrorKind::Other)) } else { (all, Ok(())) }
+        }
+    }
+
+    impl ErrorType for Model {
+        type Error = NorFlashErrorKind;
+    }
+
+    impl ReadNorFlash for Model {
+        const READ_SIZE: usize = 1;
+        fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Self::Error> {
+            let all = self.bytes.get(offset as usize..).and_then(|rest| rest.get(..bytes.len()));
+            bytes.copy_from_slice(all.ok_or(NorFlashErrorKind::OutOfBounds)?);
+            Ok(())
+        }
+        fn capacity(&self) -> usize {
+            self.bytes.len()
+        }
+    }
+
+    impl NorFlash for Model {
+        const WRITE_SIZE: usize = UNIT;
+        const ERASE_SIZE: usize = 256;
+        fn erase(&mut self, from: u32, to: u32) -> Result<(), Self::Error> {
+            assert!(from % 256 == 0 && to % 256 == 0 && from >= 256, "{from}..{to}");
+            let (done, result) = self.changes((to - from) as usize);
+            self.bytes[from as usize..][..done].fill(0xFF);
+            result
+        }
+        fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Self::Error> {
+            assert!(offset as usize % UNIT == 0 && bytes.len() % UNIT == 0);
+            let (done, result) = self.changes(bytes.len());
+            for (place, byte) in self.bytes[offset as usize..].iter_mut().zip(&bytes[..done]) {
+                *place &= byte;
+            }
+            result
+        }
+    }
+
+    /// Some program, then two sectors.
+    fn new() -> Record<Model> {
+        Record::new(Model { bytes: vec![0x5A; 3 * 256], fuse: usize::MAX }, 256)
+    }
+
+    fn load(record: &mut Record<Model>) -> Result<Vec<u8>, FlashError> {
+        let mut buffer = vec![0; record.capacity()];
+        record.load(&mut buffer).map(|length| buffer[..length].to_vec())
+    }
+
+    #[test]
+    fn what_is_saved_last_is_loaded() {
+        let mut record = new();
+        assert_eq!(load(&mut record), Ok(vec![]));
+        for length in [1, 31, 32, 33, 0, 224, 100] {
+            let bytes: Vec<u8> = (0..length).collect();
+            record.save(&bytes).unwrap();
+            assert_eq!(load(&mut record), Ok(bytes));
+        }
+        assert_eq!(record.save(&[0; 225]), Err(FlashError::TooLong(224)));
+        assert_eq!(record.load(&mut [0; 99]), Err(FlashError::TooLong(99)));
+        assert!(record.flash.bytes[..256].iter().all(|b| *b == 0x5A), "the program is untouched");
+    }
+
+    #[test]
+    fn whenever_power_goes_the_old_or_the_new_record_stands() {
+        let mut record = new();
+        record.save(&[1; 100]).unwrap();
+        record.save(&[2; 100]).unwrap();
+        let mut lost = 0;
+        for fuse in 1..=6 {
+            let mut cut = Record::new(Model { fuse, ..record.flash.clone() }, 256);
+            assert_eq!(cut.save(&[3; 100]), Err(FlashError::Failing), "{fuse}");
+            cut.flash.fuse = usize::MAX;
+            let found = load(&mut cut);
+            assert!(found == Ok(vec![2; 100]) || found == Ok(vec![3; 100]), "{fuse}: {found:?}");
+            lost += usize::from(found == Ok(vec![2; 100]));
+            cut.save(&[4; 10]).unwrap();
+            assert_eq!(load(&mut cut), Ok(vec![4; 10]));
+        }
+        assert!(lost >= 5, "power went while the new one was not whole yet");
+    }
+
+    #[test]
+    fn a_changed_bit_is_noticed() {
+        let mut record = new();
+        record.save(&[7; 50]).unwrap();
+        for at in 256..256 + UNIT + 50 {
+            let mut changed = Record::new(record.flash.clone(), 256);
+            changed.flash.bytes[at] ^= 0x10;
+            let found = load(&mut changed);
+            // A header that is none is as if nothing had ever been saved; its filling means nothing.
+            let expected = match at - 256 {
+                0..4 => Ok(vec![]),
+                16..UNIT => Ok(vec![7; 50]),
+                _ => Err(FlashError::Damaged),
+            };
+            assert!(found == expected || (8..12).contains(&(at - 256)), "{at}: {found:?}");
+            assert!(found != Ok(vec![7; 50]) || (16..UNIT).contains(&(at - 256)), "{at}");
+        }
+    }
+}

@@ -27,7 +27,7 @@ fn footprint(image: &Path) -> Footprint {
     let mut footprint = Footprint { flash: 0, memory: 0, stack: 0 };
     for section in file.sections() {
         let SectionFlags::Elf { sh_flags, .. } = section.flags() else { panic!("no ELF file") };
-        let is = |flag: u32| sh_flags & u64::from(flag) != 0;
+        let is = |flag: elf::SectionFlags| sh_flags.0 & flag.0 != 0;
         let zeroed = section.kind().is_bss();
         if is(elf::SHF_ALLOC) {
             footprint.flash += if zeroed { 0 } else { section.size() };
