@@ -1,9 +1,9 @@
 //! Ossature on a microcontroller: the core of `shared`, run where the pictures are taken.
 //!
-//! What stands so far is the memory that the core borrows ([`memory`]) and a self-test that runs the
-//! whole pipeline on drawn pictures ([`selftest`], `src/bin/selftest.rs`). Camera drivers, the serial link
-//! and the board's registers come beside them: `ports.rs` (camera, link, clock), `device.rs` (event to
-//! action), `camera/` (sensor drivers over embedded-hal 1.0) and `board/`, which alone may touch registers.
+//! What stands so far is what the device needs from its board ([`ports`]), a driver for two camera modules
+//! ([`camera`]), the memory that the core borrows ([`memory`]) and a self-test that runs the whole pipeline on
+//! drawn pictures ([`selftest`], `src/bin/selftest.rs`). The device's event loop (`device.rs`) and the board's
+//! registers (`board/`, which alone may touch them) come beside them.
 #![no_std]
 
 #[cfg(target_os = "none")]

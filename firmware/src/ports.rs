@@ -21,6 +21,9 @@ impl Exposure {
     /// Gains that an eye can apply, 1/16.
     pub const GAIN: RangeInclusive<u16> = 16..=496;
 
+    /// As little as an eye can expose.
+    pub const LEAST: Self = Self::new(0, 0);
+
     /// `lines` at a gain of `gain` / 16, both brought into range.
     pub const fn new(lines: u16, gain: u16) -> Self {
         Self { lines: clamp(lines, Self::LINES), gain: clamp(gain, Self::GAIN) }
@@ -133,7 +136,7 @@ pub trait CameraPair {
     const HEIGHT: usize;
 
     /// Start both eyes, or start them again whatever state they are in, test them, and fix the exposure.
-    /// Takes seconds.
+    /// Takes a second or two.
     ///
     /// # Errors
     /// What is wrong with the first eye found bad. Only `start` works then.

@@ -1,6 +1,7 @@
 //! Independent oracles: naive twins, shapes with known truth, a mesh checker.
 
 pub mod board;
+pub mod camera;
 pub mod cases;
 pub mod core;
 pub mod graph;
@@ -10,3 +11,4 @@ pub mod mesh_checker;
 pub mod nurbs;
 pub mod raster;
 pub mod scene;
+pub mod wire;
