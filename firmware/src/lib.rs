@@ -2,8 +2,9 @@
 //!
 //! What stands so far is what the device needs from its board ([`ports`]), a driver for two camera modules
 //! ([`camera`]), the memory that the core borrows ([`memory`]) and a self-test that runs the whole pipeline on
-//! drawn pictures ([`selftest`], `src/bin/selftest.rs`). The device's event loop (`device.rs`) and the board's
-//! registers (`board/`, which alone may touch them) come beside them.
+//! drawn pictures ([`selftest`]). [`stages`] holds boards against a PC, [`record`] keeps a calibration in flash, and
+//! `board/`, which alone may touch registers, makes ports of what boards have. The device's event loop
+//! (`device.rs`) comes beside them.
 #![no_std]
 
 #[cfg(target_os = "none")]

@@ -43,7 +43,9 @@ pub struct Record<F> {
 impl<F: NorFlash> Record<F> {
     /// On the sector that starts at `first`, and the one behind it.
     pub const fn new(flash: F, first: u32) -> Self {
-        assert!(UNIT % F::WRITE_SIZE == 0 && UNIT % F::READ_SIZE == 0 && F::ERASE_SIZE > UNIT);
+        assert!(
+            UNIT.is_multiple_of(F::WRITE_SIZE) && UNIT.is_multiple_of(F::READ_SIZE) && F::ERASE_SIZE > UNIT
+        );
         Self { flash, first }
     }
 

@@ -70,7 +70,7 @@ mod board {
     fn main() -> ! {
         let timer = Board::take().expect("taken once").timer;
         let arguments = args::<1024>().expect("arguments");
-        let path = arguments.skip(1).next().expect("usage: stages PAIRS").expect("text");
+        let path = (&arguments).into_iter().nth(1).expect("usage: stages PAIRS").expect("text");
         let mut name = [0; 1024];
         name[..path.len()].copy_from_slice(path.as_bytes());
         let path = CStr::from_bytes_until_nul(&name).expect("ended by zero");
