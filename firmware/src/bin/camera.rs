@@ -16,7 +16,7 @@ mod board {
     #[cortex_m_rt::entry]
     fn main() -> ! {
         let mut board = Board::take().expect("taken once");
-        info!("started: {}", board.reset);
+        info!("started: {}", defmt::Debug2Format(&board.reset));
         match selftest::run(STORAGE.take()) {
             Ok(disparity) => {
                 info!("self-test: the ring's disparity is {} / 256 px", disparity);

@@ -90,7 +90,7 @@ pub struct Board {
     pub lamps: Lamps,
     /// The blue button; high while it is pressed.
     pub button: Input<'static>,
-    /// Why the board has started.
+    /// Why the board has started, and how often it hung.
     pub reset: Reset,
 }
 
@@ -99,7 +99,7 @@ impl Board {
     pub fn take() -> Option<Self> {
         let mut core = Peripherals::take()?;
         let p = embassy_stm32::init(clocks::configuration());
-        let reset = reset::reason();
+        let reset = Reset::recall();
         // No master but the processor touches memory: there is no DMA, so caches cannot go stale.
         core.SCB.enable_icache();
         core.SCB.enable_dcache(&mut core.CPUID);

@@ -7,7 +7,7 @@ mod register;
 mod timer;
 mod uart;
 
-pub use timer::Timer;
+pub use timer::{Clock, Timer};
 pub use uart::Uart;
 
 use cortex_m::Peripherals;
@@ -17,6 +17,8 @@ use cortex_m::Peripherals;
 pub struct Board {
     /// The serial line.
     pub uart: Uart,
+    /// Time.
+    pub clock: Clock,
     /// Counts instructions.
     pub timer: Timer,
 }
@@ -24,6 +26,10 @@ pub struct Board {
 impl Board {
     /// The board, the first time it is asked for.
     pub fn take() -> Option<Self> {
-        Peripherals::take().map(|_| Self { uart: Uart::start(), timer: Timer::start() })
+        Peripherals::take().map(|_| Self {
+            uart: Uart::start(),
+            clock: Clock::new(Timer::start(0x4000_1000)),
+            timer: Timer::start(0x4000_0000),
+        })
     }
 }

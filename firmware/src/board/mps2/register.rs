@@ -2,7 +2,7 @@
 #![expect(unsafe_code, reason = "registers are reached by their addresses")]
 
 /// A register of 32 bits.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Register(*mut u32);
 
 impl Register {

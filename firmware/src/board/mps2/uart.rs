@@ -1,6 +1,7 @@
 //! CMSDK APB UART 0: a byte at a time, no interrupts.
 
 use super::register::Register;
+use crate::ports::{self, LinkError};
 
 const DATA: Register = Register::at(0x4000_4000);
 const STATE: Register = Register::at(0x4000_4004);
@@ -21,9 +22,10 @@ impl Uart {
         CONTROL.write(SEND_FULL | RECEIVE_FULL);
         Self(())
     }
+}
 
-    /// Take bytes that have come; how many of `buffer`'s first they fill. Does not wait.
-    pub fn receive(&mut self, buffer: &mut [u8]) -> usize {
+impl ports::Link for Uart {
+    fn receive(&mut self, buffer: &mut [u8]) -> Result<usize, LinkError> {
         let mut count = 0;
         for place in buffer {
             if STATE.read() & RECEIVE_FULL == 0 {
@@ -32,14 +34,15 @@ impl Uart {
             *place = DATA.read() as u8;
             count += 1;
         }
-        count
+        Ok(count)
     }
 
-    /// Send all bytes; waits until the last one is on its way.
-    pub fn send(&mut self, bytes: &[u8]) {
+    fn send(&mut self, bytes: &[u8]) -> Result<(), LinkError> {
         for byte in bytes {
+            // A wire takes everything, in its own time.
             while STATE.read() & SEND_FULL != 0 {}
             DATA.write(u32::from(*byte));
         }
+        Ok(())
     }
 }
