@@ -198,13 +198,13 @@ mod tests {
         const WRITE_SIZE: usize = UNIT;
         const ERASE_SIZE: usize = 256;
         fn erase(&mut self, from: u32, to: u32) -> Result<(), Self::Error> {
-            assert!(from % 256 == 0 && to % 256 == 0 && from >= 256, "{from}..{to}");
+            assert!(from.is_multiple_of(256) && to == from + 256 && from >= 256, "{from}..{to}");
             let (done, result) = self.changes((to - from) as usize);
             self.bytes[from as usize..][..done].fill(0xFF);
             result
         }
         fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Self::Error> {
-            assert!(offset as usize % UNIT == 0 && bytes.len() % UNIT == 0);
+            assert!((offset as usize).is_multiple_of(UNIT) && bytes.len() == UNIT);
             let (done, result) = self.changes(bytes.len());
             for (place, byte) in self.bytes[offset as usize..].iter_mut().zip(&bytes[..done]) {
                 *place &= byte;
