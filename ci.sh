@@ -2,7 +2,7 @@
 # The one list of checks.
 #
 #   ./ci.sh            everything
-#   ./ci.sh NAME...    single parts: fmt lint test doc firmware
+#   ./ci.sh NAME...    single parts: fmt lint test doc firmware, and qemu, which test contains
 #
 # Installs what a fresh Debian machine with rustup lacks. The last line is "N passed, N failed", counting
 # tests, and one for each check that is not made of tests. A part that ran no test fails. Exit codes: 0 all
@@ -90,6 +90,18 @@ ruler() {
     export OSSATURE_RULER=$PWD/$venv/bin/python
 }
 
+# The boards' processor, which images are built for.
+board_target() {
+    toolchain 'ls "$(rustc --print target-libdir --target "$TARGET")"/libcore-*.rlib' \
+        "install Rust with rustup (https://rustup.rs), which has the target $TARGET" target add "$TARGET"
+}
+
+# Boards to run images on.
+emulator() {
+    board_target
+    need qemu-system-arm qemu-system-arm
+}
+
 part_fmt() {
     toolchain "cargo fmt --version" "install rustfmt (Debian: apt-get install rustfmt)" component add rustfmt
     check cargo fmt --all --check
@@ -102,6 +114,7 @@ part_lint() {
 
 part_test() {
     ruler
+    emulator
     tests cargo test --workspace --locked --no-fail-fast
     # The frozen bits again, as the optimiser makes them, and the command that a newcomer runs first.
     tests cargo test --release --locked -p system-tests --test determinism --test warp
@@ -111,9 +124,21 @@ part_test() {
 part_doc() { RUSTDOCFLAGS="-D warnings" check cargo doc -q --workspace --no-deps --locked; }
 
 part_firmware() {
-    toolchain 'ls "$(rustc --print target-libdir --target "$TARGET")"/libcore-*.rlib' \
-        "install Rust with rustup (https://rustup.rs), which has the target $TARGET" target add "$TARGET"
+    board_target
+    # Boards exclude each other: one at a time, and each is looked at as closely as the rest.
+    local features
+    for features in h743 mps2; do
+        check cargo clippy -q -p firmware --target "$TARGET" --release --locked --no-default-features \
+            --features "$features" -- -D warnings
+    done
+    # As the user builds it.
     check cargo build -q -p firmware --target "$TARGET" --release --locked
+}
+
+# What images take, and the core on emulated boards held against the core on this machine, stage by stage.
+part_qemu() {
+    emulator
+    tests cargo test -q --locked -p system-tests --test emulator --test footprint -- --nocapture
 }
 
 parts=("$@")

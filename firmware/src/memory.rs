@@ -18,8 +18,8 @@ use shared::stage::nearest::Pair;
 use shared::stage::nurbs::Control;
 use shared::stage::rows::ContourMatch;
 
-/// Nodes, edges and loops.
-const PARTS: usize = 64;
+/// Loops of a contour.
+const LOOPS: usize = 64;
 
 /// A picture's size and what it may hold.
 #[derive(Clone, Copy, Debug)]
@@ -28,6 +28,9 @@ pub struct Capacities {
     pub size: Size,
     /// Points of a contour, one a pixel of arc.
     pub points: usize,
+    /// Nodes of a skeleton, and edges, before pruning: what hit-or-miss makes of a real picture's edge has
+    /// more than what is left of it.
+    pub parts: usize,
     /// Pixels of a skeleton, and samples of its branches with their tips.
     pub path: usize,
     /// Control points of all curves: one per 8 px, and three more a branch.
@@ -70,7 +73,7 @@ macro_rules! storage {
         pub struct $name {
             left: Eye<{ $capacities.mask() }, { $capacities.hull() }, { $capacities.points }>,
             right: Eye<{ $capacities.mask() }, { $capacities.hull() }, { $capacities.points }>,
-            described: Skeleton<PARTS, { $capacities.path }, { $capacities.controls }>,
+            described: Skeleton<{ $capacities.parts }, { $capacities.path }, { $capacities.controls }>,
             looked_at: Skeleton<0, 0, 0>,
             matches: Vec<ContourMatch, { $capacities.points }>,
             balls: Vec<MedialBall, { $capacities.points }>,
@@ -117,11 +120,16 @@ macro_rules! storage {
 }
 
 const SMALL: Capacities =
-    Capacities { size: Size { width: 160, height: 120 }, points: 480, path: 240, controls: 96 };
+    Capacities { size: Size { width: 160, height: 120 }, points: 480, parts: 64, path: 240, controls: 96 };
 const QVGA: Capacities =
-    Capacities { size: Size { width: 320, height: 240 }, points: 1536, path: 768, controls: 256 };
-const VGA: Capacities =
-    Capacities { size: Size { width: 640, height: 480 }, points: 4096, path: 1536, controls: 512 };
+    Capacities { size: Size { width: 320, height: 240 }, points: 1536, parts: 128, path: 768, controls: 256 };
+const VGA: Capacities = Capacities {
+    size: Size { width: 640, height: 480 },
+    points: 4096,
+    parts: 256,
+    path: 1536,
+    controls: 512,
+};
 
 storage! {
     /// Pictures of 160x120 px: for boards with 128 KB of RAM.
@@ -141,7 +149,7 @@ storage! {
 struct Eye<const MASK: usize, const HULL: usize, const POINTS: usize> {
     mask: [Word; MASK],
     contour: Vec<ContourPoint, POINTS>,
-    loops: Vec<ContourLoop, PARTS>,
+    loops: Vec<ContourLoop, LOOPS>,
     hull: Vec<PixelPoint, HULL>,
 }
 

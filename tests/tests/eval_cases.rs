@@ -1,36 +1,14 @@
-//! The gate on the cases with known truth in `../shared/eval/cases` beside the project, or wherever
-//! `OSSATURE_EVAL` points (a folder with `cases/` and `baselines.json`). They are no part of the project:
-//! without them these tests say so and pass.
+//! The gate on the cases with known truth (`oracle/src/cases.rs` says where): without them these tests say
+//! so and pass.
 
 use host::calibration::StereoCamera;
 use host::evaluate::{Evaluation, Options as Ruler, evaluate};
 use host::mesh::Mesh;
 use host::reconstruct::{Mode, Options, Profile, Reconstruction, Refusal, Skeleton, reconstruct};
 use host::view::Pinhole;
+use oracle::cases::{cases, folder, name};
 use shared::fixed::ONE;
-use std::path::{Path, PathBuf};
-
-fn folder() -> Option<PathBuf> {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/eval");
-    let folder = std::env::var_os("OSSATURE_EVAL").map_or_else(beside, PathBuf::from);
-    if folder.join("cases").is_dir() {
-        return Some(folder);
-    }
-    eprintln!("\n!!!! SKIPPED: no evaluation cases in {}; set OSSATURE_EVAL !!!!\n", folder.display());
-    None
-}
-
-fn cases(folder: &Path) -> Vec<PathBuf> {
-    let entries = std::fs::read_dir(folder.join("cases")).unwrap();
-    let mut cases: Vec<_> =
-        entries.map(|e| e.unwrap().path()).filter(|p| p.join("truth.ply").is_file()).collect();
-    cases.sort();
-    cases
-}
-
-fn name(case: &Path) -> String {
-    case.file_name().unwrap().to_string_lossy().into_owned()
-}
+use std::path::Path;
 
 fn run(case: &Path, options: &Options) -> Result<Reconstruction, Refusal> {
     let open = |name: &str| image::open(case.join(name)).unwrap().to_luma8();

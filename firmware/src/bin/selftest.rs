@@ -1,26 +1,24 @@
-//! Boots the board, runs the core on drawn pictures and stops: at a breakpoint with the disparity of the
-//! ring in the first argument register when all is well, in the panic handler when not.
+//! The self-test on an emulated board of 128 KB of RAM: exits with 0 when the core gives what it must.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
 mod board {
-    use cortex_m::singleton;
-    use firmware::memory::Qvga;
+    use firmware::memory::Small;
     use firmware::selftest::run;
-    use panic_halt as _;
+    use semihosting::{println, process};
+    use static_cell::ConstStaticCell;
+
+    static STORAGE: ConstStaticCell<Small> = ConstStaticCell::new(Small::new());
 
     #[cortex_m_rt::entry]
     fn main() -> ! {
-        let storage = singleton!(: Qvga = Qvga::new()).expect("taken once");
-        let disparity = run(storage).expect("the ring is found");
-        core::hint::black_box(disparity);
-        loop {
-            cortex_m::asm::bkpt();
-        }
+        let disparity = run(STORAGE.take()).expect("the ring is found");
+        println!("disparity {disparity}");
+        process::exit(0)
     }
 }
 
 #[cfg(not(target_os = "none"))]
 fn main() {
-    println!("build me for the board: cargo build -p firmware --release --target thumbv7em-none-eabihf");
+    println!("this runs on an emulated board: see firmware/README.md");
 }

@@ -1,6 +1,8 @@
 //! Independent oracles: naive twins, shapes with known truth, a mesh checker.
 
+pub mod board;
 pub mod camera;
+pub mod cases;
 pub mod core;
 pub mod device;
 pub mod graph;

@@ -1,0 +1,103 @@
+//! Runs the core on pairs from a file, on an emulated board, and says what each stage makes and costs.
+//!
+//! `stages PAIRS`: for each pair six numbers (i32, little endian) and two grey pictures, the left one first:
+//! width, height, focal length (1/256 px), offset of disparities (1/256 px), median filter and so on as the
+//! device has them (1) or all that the core can (0), and 0. Prints a line a stage: the number of the pair,
+//! eye, stage, CRC-32 of the product, instructions; and `done` at the end.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+#[cfg(target_os = "none")]
+mod board {
+    use core::ffi::CStr;
+    use firmware::board::mps2::{Board, Timer};
+    use firmware::memory::{Capacities, Qvga, Storage, Vga};
+    use firmware::stages::{Stages, run};
+    use semihosting::experimental::env::args;
+    use semihosting::fs::File;
+    use semihosting::io::Read;
+    use semihosting::{println, process};
+    use shared::bitmap::{Grey, Size};
+    use shared::pipeline::{Memory, Settings, scratch_words};
+    use shared::stage::depth::Optics;
+    use shared::stage::thinning::scratch_order;
+    use static_cell::ConstStaticCell;
+
+    const LARGEST: Capacities = Vga::CAPACITIES;
+    /// Thinning by distance has a list of the object's pixels, which may fill the core's limit of 60 %.
+    const ORDER: usize = scratch_order(LARGEST.size.pixels() * 6 / 10, u16::MAX >> 2);
+    const SCRATCH: usize = scratch_words(LARGEST.size, LARGEST.points, LARGEST.controls, ORDER);
+
+    static QVGA: ConstStaticCell<Qvga> = ConstStaticCell::new(Qvga::new());
+    static VGA: ConstStaticCell<Vga> = ConstStaticCell::new(Vga::new());
+    static ALL_SCRATCH: ConstStaticCell<[u64; SCRATCH]> = ConstStaticCell::new([0; SCRATCH]);
+    static PICTURES: ConstStaticCell<[[u8; LARGEST.size.pixels()]; 2]> =
+        ConstStaticCell::new([[0; LARGEST.size.pixels()]; 2]);
+
+    /// What stands before a pair's pictures.
+    struct Header {
+        size: Size,
+        optics: Optics,
+        as_device: bool,
+    }
+
+    /// The next pair's, unless the file has ended.
+    fn header(file: &mut File) -> Option<Header> {
+        let mut bytes = [0; 24];
+        if file.read(&mut bytes).expect("the file can be read") == 0 {
+            return None;
+        }
+        let (numbers, _) = bytes.as_chunks::<4>();
+        let [width, height, focal, disparity_offset, as_device, 0] =
+            [0, 1, 2, 3, 4, 5].map(|i: usize| i32::from_le_bytes(numbers[i]))
+        else {
+            panic!("this is no header of a pair");
+        };
+        let size = Size::new(width as usize, height as usize).expect("a size");
+        Some(Header { size, optics: Optics { focal, disparity_offset }, as_device: as_device == 1 })
+    }
+
+    fn settings(header: &Header) -> Settings {
+        if header.as_device { Settings::device(header.optics) } else { Settings::new(header.optics) }
+    }
+
+    fn observe(number: usize, memory: &mut Memory<'_>, pair: [Grey<'_>; 2], header: &Header, timer: &Timer) {
+        let mut stages = Stages::new(timer, |record| println!("{number} {record} {}", record.cost));
+        let outcome = run(memory, pair, &settings(header), &mut stages);
+        stages.ended(&outcome, memory.eyes[0].samples);
+    }
+
+    #[cortex_m_rt::entry]
+    fn main() -> ! {
+        let timer = Board::take().expect("taken once").timer;
+        let arguments = args::<1024>().expect("arguments");
+        let path = (&arguments).into_iter().nth(1).expect("usage: stages PAIRS").expect("text");
+        let mut name = [0; 1024];
+        name[..path.len()].copy_from_slice(path.as_bytes());
+        let path = CStr::from_bytes_until_nul(&name).expect("ended by zero");
+        let mut file = File::open(path).unwrap_or_else(|_| panic!("cannot open {path:?}"));
+
+        let (qvga, vga, scratch, pictures) = (QVGA.take(), VGA.take(), ALL_SCRATCH.take(), PICTURES.take());
+        let mut number = 0;
+        while let Some(header) = header(&mut file) {
+            let size = header.size;
+            for picture in pictures.iter_mut() {
+                file.read_exact(&mut picture[..size.pixels()]).expect("a whole picture");
+            }
+            let pair = pictures.each_ref().map(|bytes| Grey::new(size, size.width, bytes).expect("checked"));
+            let fits = |c: Capacities| size.width <= c.size.width && size.height <= c.size.height;
+            let mut memory = if fits(Qvga::CAPACITIES) { qvga.lend() } else { vga.lend() };
+            if !header.as_device {
+                memory.scratch = scratch;
+            }
+            observe(number, &mut memory, pair, &header, &timer);
+            number += 1;
+        }
+        println!("done");
+        process::exit(0)
+    }
+}
+
+#[cfg(not(target_os = "none"))]
+fn main() {
+    println!("this runs on an emulated board: see firmware/README.md");
+}

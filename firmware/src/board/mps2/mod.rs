@@ -1,0 +1,35 @@
+//! Emulated boards: QEMU's mps2-an386 (Cortex-M4F) and mps2-an500 (Cortex-M7), which share a memory map, so
+//! that one image runs on both. Files, arguments and exit codes go through semihosting: the `semihosting`
+//! crate, whose panic handler says why and exits with 101.
+
+mod fault;
+mod register;
+mod timer;
+mod uart;
+
+pub use timer::{Clock, Timer};
+pub use uart::Uart;
+
+use cortex_m::Peripherals;
+
+/// What a board has.
+#[derive(Debug)]
+pub struct Board {
+    /// The serial line.
+    pub uart: Uart,
+    /// Time.
+    pub clock: Clock,
+    /// Counts instructions.
+    pub timer: Timer,
+}
+
+impl Board {
+    /// The board, the first time it is asked for.
+    pub fn take() -> Option<Self> {
+        Peripherals::take().map(|_| Self {
+            uart: Uart::start(),
+            clock: Clock::new(Timer::start(0x4000_1000)),
+            timer: Timer::start(0x4000_0000),
+        })
+    }
+}

@@ -1,0 +1,29 @@
+//! Cases with known truth: in `../shared/eval/cases` beside the project, or wherever `OSSATURE_EVAL` points
+//! (a folder with `cases/` and `baselines.json`). They are no part of the project.
+
+use std::path::{Path, PathBuf};
+
+/// The folder, or nothing, said loudly.
+pub fn folder() -> Option<PathBuf> {
+    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/eval");
+    let folder = std::env::var_os("OSSATURE_EVAL").map_or_else(beside, PathBuf::from);
+    if folder.join("cases").is_dir() {
+        return Some(folder);
+    }
+    eprintln!("\n!!!! SKIPPED: no evaluation cases in {}; set OSSATURE_EVAL !!!!\n", folder.display());
+    None
+}
+
+/// The folders of the cases, by name.
+pub fn cases(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder.join("cases")).unwrap();
+    let mut cases: Vec<_> =
+        entries.map(|e| e.unwrap().path()).filter(|p| p.join("truth.ply").is_file()).collect();
+    cases.sort();
+    cases
+}
+
+/// A case's name.
+pub fn name(case: &Path) -> String {
+    case.file_name().unwrap().to_string_lossy().into_owned()
+}
