@@ -15,9 +15,9 @@ use shared::stage::depth::Optics;
 use shared::stage::nurbs::Control;
 use shared::stage::rows::ContourMatch;
 use shared::wire::{
-    Answer, Capacities, Counters, DISPARITY_STEP, Decoder, ErrorCode, Exposure, ExposureSetting, Frame, Health,
-    Hello, MAX_FRAME, POSITION_STEP, PairReport, PictureKind, PicturePart, ResetReason, Sequence, Shape,
-    ShapeLists, TURN_STEP, ToDevice, ToHost, VERSION, WireError,
+    Answer, Capacities, Counters, DISPARITY_STEP, Decoder, ErrorCode, Exposure, ExposureSetting, Frame,
+    Health, Hello, MAX_FRAME, POSITION_STEP, PairReport, PictureKind, PicturePart, ResetReason, Sequence,
+    Shape, ShapeLists, TURN_STEP, ToDevice, ToHost, VERSION, WireError,
 };
 use std::path::{Path, PathBuf};
 
@@ -102,11 +102,20 @@ fn probe() {
         let rectification = Rectification::whole(&calibration).unwrap();
         let camera = rectification.camera();
         let pair = rectification.images(open("left.png"), open("right.png")).unwrap();
-        let optics = Optics { focal: (camera.f * 128.0) as i32, disparity_offset: (camera.disparity_offset() * 128.0) as i32 };
+        let optics = Optics {
+            focal: (camera.f * 128.0) as i32,
+            disparity_offset: (camera.disparity_offset() * 128.0) as i32,
+        };
         let pair = pair.map(|p| halved(&p));
         let r = describe(&pair, optics, |shape| {
             let b = bytes(&report(Ok(shape)));
-            (b.len(), shape.contour.len(), shape.hulls.map(<[_]>::len), shape.branches.len(), shape.controls.len())
+            (
+                b.len(),
+                shape.contour.len(),
+                shape.hulls.map(<[_]>::len),
+                shape.branches.len(),
+                shape.controls.len(),
+            )
         });
         println!("{} {:?} {r:?}", case.display(), pair[0].dimensions());
     }

@@ -70,6 +70,26 @@ enum Mode {
 }
 
 impl MethodArgs {
+    /// The choices for a device's shape, in the terms of [`crate::reconstruct`].
+    ///
+    /// # Errors
+    ///
+    /// A [`clap::Error`] if one of them is none that a device has.
+    pub fn device_options(&self) -> Result<Options, Failure> {
+        let chosen = self.options()?;
+        if self.mode == Mode::Paper || self.thinning.is_some() || self.branches.is_some() {
+            return Err(usage(
+                "--mode paper, --thinning and --branches are nothing that a device can be told",
+            ));
+        }
+        let device = Options::device();
+        Ok(Options {
+            profile: self.profile.unwrap_or(device.profile),
+            skeleton: self.skeleton.unwrap_or(device.skeleton),
+            ..chosen
+        })
+    }
+
     /// The choices in the terms of [`crate::reconstruct`].
     ///
     /// # Errors

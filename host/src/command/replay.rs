@@ -13,6 +13,8 @@
 //! boundary.ply, report.json and pictures of every stage. What does not give a trustworthy model is
 //! refused with the reason, and leaves no files; the other pairs go on.
 //!
+//! --as-device makes of pictures what a camera device would make of them and send (`host listen`).
+//!
 //! Examples:
 //!   host replay left.png right.png --calib calib.yaml
 //!   host replay left.png right.png --focal 750 --baseline 60
@@ -46,6 +48,10 @@ pub struct Args {
     /// Exchange left and right
     #[arg(long)]
     swap: bool,
+    /// Go the way of a camera device: its rectification, its steps, what its link carries; --skeleton is nurbs
+    /// and --profile device then, unless given
+    #[arg(long)]
+    as_device: bool,
     #[command(flatten)]
     cameras: CameraArgs,
     #[command(flatten)]
@@ -84,7 +90,7 @@ struct Success {
 ///
 /// If there is no pair, or any is refused.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let options = args.method.options()?;
+    let options = if args.as_device { args.method.device_options() } else { args.method.options() }?;
     let found = told(args.json, pairs(args))?;
     let done = told(args.json, all(args, &options, &found))?;
     if args.json {
@@ -137,6 +143,9 @@ fn one(args: &Args, options: &Options, pair: &Pair, folder: &Path) -> Result<Suc
     let Views { images, warnings } = views;
     let make = || {
         let (calibration, beside) = args.cameras.of(pair, &images[0])?;
+        if args.as_device {
+            return Ok((model::make_as_device(images, &calibration, options, folder)?, beside));
+        }
         let pictures = !args.no_pictures;
         let order = Order { images, calibration: &calibration, options, pictures, truth: None, folder };
         Ok((model::make(order)?, beside))

@@ -6,6 +6,7 @@
 pub mod find;
 mod names;
 pub mod picture;
+pub mod serial;
 
 use std::path::{Path, PathBuf};
 
