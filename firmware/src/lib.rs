@@ -1,12 +1,14 @@
 //! Ossature on a microcontroller: the core of `shared`, run where the pictures are taken.
 //!
-//! What stands so far is the memory that the core borrows ([`memory`]) and a self-test that runs the
-//! whole pipeline on drawn pictures ([`selftest`], `src/bin/selftest.rs`). Camera drivers, the serial link
-//! and the board's registers come beside them: `ports.rs` (camera, link, clock), `device.rs` (event to
-//! action), `camera/` (sensor drivers over embedded-hal 1.0) and `board/`, which alone may touch registers.
+//! [`device`] decides: events in, actions out, no I/O. [`drive`] carries its actions out through the traits
+//! of [`ports`], on a board, in an emulator and on a PC alike. [`memory`] is what the core borrows, `camera`
+//! drives the eyes over embedded-hal 1.0, and [`selftest`] runs the core on drawn pictures. Registers belong
+//! to `board/` alone.
 #![no_std]
 
 pub mod camera;
+pub mod device;
+pub mod drive;
 pub mod memory;
 pub mod ports;
 pub mod selftest;

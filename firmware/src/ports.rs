@@ -1,7 +1,7 @@
 //! What the device needs from the board: two cameras, a link, a clock, and flash for the calibration.
 //!
-//! The board's main loop owns these and carries frames and bytes between them and the device; the device
-//! itself does no I/O. Every call ends: what waits, waits for a stated time at most.
+//! The board's main owns these; [`drive`](crate::drive) carries frames and bytes between them and the
+//! device, which itself does no I/O. Every call ends: what waits, waits for a stated time at most.
 
 use core::ops::RangeInclusive;
 pub use shared::pipeline::Side;
@@ -20,6 +20,9 @@ impl Exposure {
     pub const LINES: RangeInclusive<u16> = 1..=670;
     /// Gains that an eye can apply, 1/16.
     pub const GAIN: RangeInclusive<u16> = 16..=496;
+
+    /// As little as an eye can expose.
+    pub const LEAST: Self = Self::new(0, 0);
 
     /// `lines` at a gain of `gain` / 16, both brought into range.
     pub const fn new(lines: u16, gain: u16) -> Self {
@@ -133,7 +136,7 @@ pub trait CameraPair {
     const HEIGHT: usize;
 
     /// Start both eyes, or start them again whatever state they are in, test them, and fix the exposure.
-    /// Takes seconds.
+    /// Takes a second or two.
     ///
     /// # Errors
     /// What is wrong with the first eye found bad. Only `start` works then.
@@ -208,7 +211,7 @@ pub trait Flash {
     /// A buffer that is too short, a record that is damaged, a failing memory.
     fn load(&mut self, buffer: &mut [u8]) -> Result<usize, FlashError>;
 
-    /// Replace the record. Whatever happens meanwhile, the old one or the new one stands whole.
+    /// Replace the record; an empty one is as none. Whatever happens meanwhile, the old one or the new one stands whole.
     ///
     /// # Errors
     /// Too many bytes, or a failing memory.
@@ -224,4 +227,11 @@ pub enum FlashError {
     Damaged,
     /// The memory does not erase, write or read.
     Failing,
+}
+
+/// Resets the board unless it is fed in time: later than the longest call of these ports and the longest step
+/// of the core take, together some seconds.
+pub trait Watchdog {
+    /// All is well.
+    fn feed(&mut self);
 }

@@ -114,12 +114,12 @@ impl<S: SpiDevice> ArduChip<S> {
         self.write(FIFO, START)
     }
 
-    /// Whether the frame is kept.
+    /// Whether the frame is kept; told twice, as the length of half a frame would be read after a flipped bit.
     ///
     /// # Errors
     /// A failing bus.
     pub fn is_done(&mut self) -> Result<bool, CameraFault> {
-        Ok(self.register(STATUS)? & DONE != 0)
+        Ok(self.register(STATUS)? & DONE != 0 && self.register(STATUS)? & DONE != 0)
     }
 
     /// Whether the frame kept is a whole one.

@@ -1,6 +1,6 @@
 //! Two modules as one pair of eyes.
 //!
-//! Each step is taken by both eyes before the next, so that waiting is shared and a shared control bus works.
+//! Each step is taken by both eyes before the next, so that a shared control bus works and waiting is shared.
 //! Both captures are started back to back, but each sensor runs on its own: each eye keeps its next whole
 //! frame, and the skew between both is up to one frame. It is measured, not mended.
 
@@ -78,17 +78,19 @@ pub struct Pair<S, I, D, C> {
     modules: [Module<S, I>; 2],
     delay: D,
     clock: C,
+    /// The exposure last ordered.
+    exposure: Exposure,
     started: bool,
 }
 
 impl<S: SpiDevice, I: I2c, D: DelayNs, C: Clock> Pair<S, I, D, C> {
     /// The left and the right module, not started yet.
-    pub const fn new(left: Module<S, I>, right: Module<S, I>, delay: D, clock: C) -> Self {
-        Self { modules: [left, right], delay, clock, started: false }
+    pub fn new(left: Module<S, I>, right: Module<S, I>, delay: D, clock: C) -> Self {
+        Self { modules: [left, right], delay, clock, exposure: Exposure::default(), started: false }
     }
 
-    /// From any state to pictures of fixed exposure.
-    fn set_up(&mut self, exposure: Exposure) -> Result<[Identity; 2], CameraError> {
+    /// From any state to pictures of the exposure ordered.
+    fn set_up(&mut self) -> Result<[Identity; 2], CameraError> {
         let (modules, delay) = (&mut self.modules, &mut self.delay);
         for on in [true, false] {
             both(modules, |m| m.chip.reset(on))?;
@@ -98,21 +100,31 @@ impl<S: SpiDevice, I: I2c, D: DelayNs, C: Clock> Pair<S, I, D, C> {
         both(modules, |m| m.chip.set_up())?;
         // Another sensor is not written to.
         both(modules, |m| m.sensor.identify())?;
-        both(modules, |m| m.sensor.reset())?;
-        delay.delay_ms(ov2640::RESET_MS);
+        both(modules, |m| {
+            m.sensor.reset()?;
+            // At once: on a shared bus this reset both, and the other one's order must be heard.
+            delay.delay_ms(ov2640::RESET_MS);
+            Ok(())
+        })?;
         both(modules, |m| m.sensor.set_up())?;
-        both(modules, |m| m.sensor.expose(exposure))?;
         self.test()?;
         both(&mut self.modules, Module::identity)
     }
 
-    /// Colour bars through the whole way.
+    /// Colour bars through the whole way. They may be laid over what is seen, so next to nothing is exposed.
     fn test(&mut self) -> Result<(), CameraError> {
-        both(&mut self.modules, |m| m.sensor.show_bars(true))?;
-        self.delay.delay_ms(ov2640::SETTLE_MS);
+        self.show(true, Exposure::LEAST)?;
         self.take()?;
         both(&mut self.modules, Module::judge_bars)?;
-        both(&mut self.modules, |m| m.sensor.show_bars(false))?;
+        self.show(false, self.exposure)
+    }
+
+    /// Let both eyes see bars or the world, and wait until their frames do.
+    fn show(&mut self, bars: bool, exposure: Exposure) -> Result<(), CameraError> {
+        both(&mut self.modules, |m| {
+            m.sensor.expose(exposure)?;
+            m.sensor.show_bars(bars)
+        })?;
         self.delay.delay_ms(ov2640::SETTLE_MS);
         Ok(())
     }
@@ -135,13 +147,24 @@ impl<S: SpiDevice, I: I2c, D: DelayNs, C: Clock> Pair<S, I, D, C> {
         Ok(Stamps { done })
     }
 
-    /// Before anything but reading: pictures are forgotten, and the eyes count as stopped until all is done.
-    fn begin(&mut self) -> Result<(), CameraError> {
-        for module in &mut self.modules {
-            module.done = None;
-        }
+    fn need_start(&self) -> Result<(), CameraError> {
         let stopped = CameraError { side: Side::Left, fault: CameraFault::NotStarted };
-        if core::mem::take(&mut self.started) { Ok(()) } else { Err(stopped) }
+        if self.started { Ok(()) } else { Err(stopped) }
+    }
+
+    fn forget_pictures(&mut self) {
+        self.modules.iter_mut().for_each(|m| m.done = None);
+    }
+
+    /// Act on both eyes: pictures that were not read are lost, and after a failure the eyes count as stopped.
+    fn act<T>(&mut self, action: impl FnOnce(&mut Self) -> Result<T, CameraError>) -> Result<T, CameraError> {
+        self.forget_pictures();
+        let result = action(self);
+        if result.is_err() {
+            self.forget_pictures();
+        }
+        self.started = result.is_ok();
+        result
     }
 }
 
@@ -150,28 +173,21 @@ impl<S: SpiDevice, I: I2c, D: DelayNs, C: Clock> CameraPair for Pair<S, I, D, C>
     const HEIGHT: usize = registers::HEIGHT;
 
     fn start(&mut self, exposure: Exposure) -> Result<[Identity; 2], CameraError> {
-        // Whether they ran does not matter here.
-        let _ = self.begin();
-        let identities = self.set_up(exposure)?;
-        self.started = true;
-        Ok(identities)
+        self.exposure = exposure;
+        self.act(Self::set_up)
     }
 
     fn expose(&mut self, exposure: Exposure) -> Result<(), CameraError> {
-        self.begin()?;
-        both(&mut self.modules, |m| m.sensor.expose(exposure))?;
-        self.delay.delay_ms(ov2640::SETTLE_MS);
-        self.started = true;
-        Ok(())
+        self.need_start()?;
+        self.exposure = exposure;
+        self.act(|eyes| eyes.show(false, exposure))
     }
 
     fn capture(&mut self) -> Result<Stamps, CameraError> {
-        self.begin()?;
-        let taken = self.take();
+        self.need_start()?;
+        let taken = self.act(Self::take);
+        // Only a capture that still runs is in the way of another.
         self.started = !matches!(taken, Err(CameraError { fault: CameraFault::TimeLimit(_), .. }));
-        if taken.is_err() {
-            self.modules.iter_mut().for_each(|m| m.done = None);
-        }
         taken
     }
 
@@ -192,9 +208,7 @@ impl<S: SpiDevice, I: I2c, D: DelayNs, C: Clock> CameraPair for Pair<S, I, D, C>
     }
 
     fn self_test(&mut self) -> Result<(), CameraError> {
-        self.begin()?;
-        self.test()?;
-        self.started = true;
-        Ok(())
+        self.need_start()?;
+        self.act(Self::test)
     }
 }

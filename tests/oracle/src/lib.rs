@@ -1,5 +1,6 @@
 //! Independent oracles: naive twins, shapes with known truth, a mesh checker.
 
+pub mod camera;
 pub mod core;
 pub mod graph;
 pub mod link;
