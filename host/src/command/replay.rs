@@ -15,6 +15,9 @@
 //!
 //! --as-device makes of pictures what a camera device would make of them and send (`host listen`).
 //!
+//! INPUT may also be a recording of a camera device (`host listen --record`), which gives the models that it
+//! gave live; it holds its calibration.
+//!
 //! Examples:
 //!   host replay left.png right.png --calib calib.yaml
 //!   host replay left.png right.png --focal 750 --baseline 60
@@ -31,9 +34,10 @@ use serde_json::json;
 use super::model::{self, Model, Order};
 use super::options::{CameraArgs, MethodArgs};
 use super::table::Table;
-use super::{Failure, batch, note, say, say_json, told, words_of};
+use super::{Failure, batch, listen, note, say, say_json, told, words_of};
 use crate::reconstruct::Options;
 use crate::source::find::{Found, find};
+use crate::source::serial::recording::is_recording;
 use crate::source::{Files, Layout, Pair, Views};
 
 /// Arguments of `replay`.
@@ -91,6 +95,12 @@ struct Success {
 /// If there is no pair, or any is refused.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let options = if args.as_device { args.method.device_options() } else { args.method.options() }?;
+    if let [input] = args.input.as_slice()
+        && is_recording(Path::new(input))
+    {
+        let options = args.method.device_options()?;
+        return told(args.json, listen::replay(Path::new(input), &options, &args.out, args.json));
+    }
     let found = told(args.json, pairs(args))?;
     let done = told(args.json, all(args, &options, &found))?;
     if args.json {
