@@ -23,10 +23,10 @@ use crate::stage::rectify::Rectification;
 #[command(next_help_heading = "Device")]
 pub(super) struct PortArgs {
     /// Port of the device: a serial port, the path of a socket, or auto for the only one plugged in
-    #[arg(long, value_name = "PATH|auto", default_value = "auto")]
+    #[arg(long, global = true, value_name = "PATH|auto", default_value = "auto")]
     port: Address,
     /// Rate of a serial port with wires; USB has its own
-    #[arg(long, value_name = "BAUD", default_value_t = 115_200, value_parser = clap::value_parser!(u32).range(300..))]
+    #[arg(long, global = true, value_name = "BAUD", default_value_t = 115_200, value_parser = clap::value_parser!(u32).range(300..))]
     baud: u32,
 }
 
