@@ -1,8 +1,8 @@
 //! Commands: what the device does about them, each answered by its number.
 
+use super::Device;
 use super::calibration::{read_record, write_record};
 use super::link::{MAX_COMMAND, Waiting};
-use super::{Device, Eyes};
 use crate::ports::{Exposure, FlashError};
 use shared::arena::Arena;
 use shared::wire::{self, ErrorCode, ExposureSetting, ToDevice, WireError};
@@ -92,11 +92,9 @@ impl Device<'_> {
         Ok(())
     }
 
-    const fn need_eyes(&self) -> Result<(), ErrorCode> {
-        match self.eyes {
-            Eyes::Up { .. } => Ok(()),
-            Eyes::Down { .. } => Err(ErrorCode::Camera),
-        }
+    /// Eyes that are about to be started again after a fault will do.
+    fn need_eyes(&self) -> Result<(), ErrorCode> {
+        self.identities.map(|_| ()).ok_or(ErrorCode::Camera)
     }
 
     /// Flash has been read: use what lies there.

@@ -160,6 +160,7 @@ pub struct Device<'m> {
     greeted: bool,
     now: u64,
     eyes: Eyes,
+    /// What the eyes said that they are, unless their last start failed.
     identities: Option<[Identity; 2]>,
     starts: u32,
     control: Control,
@@ -234,6 +235,15 @@ impl<'m> Device<'m> {
         if self.outbox.waiting != Waiting::Nothing {
             return Decision::Out;
         }
+        // Nothing is said before hello, and that tells what the eyes are.
+        if self.starts == 0 {
+            return Decision::Start;
+        }
+        if !self.greeted {
+            self.greeted = true;
+            self.say_hello();
+            return Decision::Out;
+        }
         if let Some((number, command)) = self.inbox.command() {
             self.obey(number, command);
             return Decision::Out;
@@ -246,11 +256,6 @@ impl<'m> Device<'m> {
             && due <= self.now
         {
             return Decision::Start;
-        }
-        if !self.greeted {
-            self.greeted = true;
-            self.say_hello();
-            return Decision::Out;
         }
         if self.now >= self.health_due {
             self.say_health();

@@ -2,6 +2,7 @@
 
 pub mod camera;
 pub mod core;
+pub mod device;
 pub mod graph;
 pub mod link;
 pub mod matching;
