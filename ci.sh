@@ -104,7 +104,7 @@ part_test() {
     ruler
     tests cargo test --workspace --locked --no-fail-fast
     # The frozen bits again, as the optimiser makes them, and the command that a newcomer runs first.
-    tests cargo test --release --locked -p system-tests --test determinism
+    tests cargo test --release --locked -p system-tests --test determinism --test warp
     check cargo run -q --release --locked -p host -- demo --out target/ci-demo
 }
 

@@ -1,5 +1,6 @@
 //! What the gates look at, for every built-in shape and, if the folder is named, for evaluation cases:
-//! `cargo run --release -p system-tests --example gate_figures [-- CASES]`.
+//! `cargo run --release -p system-tests --example gate_figures [-- CASES]`. Last, how often e_omega picks
+//! shift 0 for hulls that have nothing to do with each other.
 
 use host::calibration::StereoCamera;
 use host::reconstruct::{Options, reconstruct};
@@ -10,18 +11,23 @@ use oracle::scene::{camera, pair};
 use shared::fixed::{ONE, PX};
 use shared::pipeline::{Finding, Observer, Product, Side};
 use shared::point::PixelPoint;
-use shared::stage::correspond::CutMatch;
+use shared::stage::correspond::{CutMatch, match_cuts};
 use shared::stage::plane::{ImagePlane, Observation};
+
+/// Hulls of the left and the right view.
+type Hulls = [Vec<PixelPoint>; 2];
 
 #[derive(Default)]
 struct Seen {
+    hulls: Hulls,
     cuts: Option<CutMatch>,
     unmatched: Option<f64>,
 }
 
 impl Observer for Seen {
-    fn saw(&mut self, _: Option<Side>, product: Product<'_>) {
+    fn saw(&mut self, side: Option<Side>, product: Product<'_>) {
         match product {
+            Product::Hull(hull) => self.hulls[usize::from(side == Some(Side::Right))] = hull.to_vec(),
             Product::Cuts(cuts) => self.cuts = Some(*cuts),
             Product::Rows(_, rows) => {
                 self.unmatched = Some(f64::from(rows.unmatched) / f64::from(rows.crossings.max(1)));
@@ -41,7 +47,7 @@ fn residual(cuts: &CutMatch) -> f64 {
     f64::from(sum) / seen.len() as f64 / f64::from(PX)
 }
 
-fn line(name: &str, left: &GrayImage, right: &GrayImage, camera: &StereoCamera) {
+fn line(name: &str, left: &GrayImage, right: &GrayImage, camera: &StereoCamera) -> Hulls {
     let mut seen = Seen::default();
     let found = reconstruct(left.clone(), right.clone(), camera, &Options::default(), &mut seen);
     let verdict = match &found {
@@ -67,18 +73,35 @@ fn line(name: &str, left: &GrayImage, right: &GrayImage, camera: &StereoCamera) 
     println!(
         "{name:28} residual {residual:6.2} px {by_height:5.2} {by_both:5.2} %  e0 {e0:8.2}  least {least:7.2} at {shift:2}  unmatched {unmatched:.3}  {verdict}"
     );
+    seen.hulls
 }
 
-fn lines(name: &str, [left, right]: &[GrayImage; 2], camera: &StereoCamera) {
-    line(name, left, right, camera);
+/// The line of a pair and of its mirrored one; the hulls of the pair.
+fn lines(name: &str, [left, right]: &[GrayImage; 2], camera: &StereoCamera) -> Hulls {
+    let hulls = line(name, left, right, camera);
     line(&format!("{name} mirrored"), left, &imageops::flip_horizontal(right), camera);
+    hulls
+}
+
+/// How often e_omega, which knows nothing of rows, picks shift 0 for the left hull of one object and the right hull of another.
+fn strangers(objects: &[Hulls]) {
+    let strange = objects.iter().enumerate().flat_map(|(i, a)| {
+        objects.iter().enumerate().filter(move |(j, _)| *j != i).map(|(_, b)| (&a[0], &b[1]))
+    });
+    let picked: Vec<_> = strange.filter_map(|(a, b)| match_cuts(a, b)).map(|cuts| cuts.least == 0).collect();
+    let right = picked.iter().filter(|zero| **zero).count();
+    println!("hulls of two objects: e_omega picks shift 0 for {right} of {}", picked.len());
 }
 
 fn main() {
+    let mut objects = Vec::new();
     for shape in Shape::ALL {
         for scale in [1, 2] {
             let clean = pair(shape, scale);
-            lines(&format!("{shape}/{scale}"), &clean, &camera(scale));
+            let hulls = lines(&format!("{shape}/{scale}"), &clean, &camera(scale));
+            if scale == 1 {
+                objects.push(hulls);
+            }
             let mut noisy = clean;
             for (image, seed) in noisy.iter_mut().zip(1..) {
                 Noise { sigma: 20.0, salt_and_pepper: 0.02, seed }.apply(image);
@@ -95,8 +118,10 @@ fn main() {
             if let (Ok(left), Ok(right), Ok(camera)) =
                 (open("left.png"), open("right.png"), StereoCamera::read(case.join("calib.yaml")))
             {
-                lines(&case.file_name().unwrap_or_default().to_string_lossy(), &[left, right], &camera);
+                let name = case.file_name().unwrap_or_default().to_string_lossy();
+                lines(&name, &[left, right], &camera);
             }
         }
     }
+    strangers(&objects);
 }

@@ -4,7 +4,7 @@
 //! `-- --nocapture` prints the figures.
 
 use firmware::camera::pair::{Module, Pair as Modules};
-use firmware::device::{Event, HEALTH_US};
+use firmware::device::{Condition, Event, HEALTH_US};
 use firmware::ports::{CameraError, CameraFault, CameraPair, Clock, FlashError, LinkError, Side, Stamps};
 use host::calibration::{Camera, Distortion, StereoCamera};
 use host::shape::Shape as Solid;
@@ -166,6 +166,7 @@ fn it_says_hello_when_it_boots_and_when_it_is_asked() {
     let (mut bench, world) = bench(scenes(Solid::Sphere));
     let first = bench.next_hello();
     assert_eq!(bench.heard.len(), 1, "nothing comes before hello");
+    assert_eq!(bench.device().condition(), Condition::Ready);
     assert_eq!((first.board, first.reset, first.sensors), ("bench", ResetReason::Watchdog, [0x2642; 2]));
     assert_eq!((first.picture, first.calibration), ([320, 240], None));
     assert_eq!((first.capacities.contour, first.capacities.controls), (1536, 256));
@@ -261,6 +262,7 @@ fn it_starts_and_stops() {
     let (mut bench, _) = running(scenes(Solid::Capsule), plain());
     let numbers: Vec<u32> = (0..3).map(|_| bench.report().number).collect();
     assert_eq!(numbers, [1, 2, 3]);
+    assert_eq!(bench.device().condition(), Condition::Working);
     assert_eq!(bench.ask(&ToDevice::Stop), Ok(()));
     assert!(bench.steps(500).is_empty(), "nothing comes behind the answer to stop");
     assert_eq!(bench.ask(&ToDevice::Start), Ok(()));
@@ -462,7 +464,9 @@ fn dead_eyes_are_told_and_awaited() {
     let (eyes, world) = Eyes::new(scenes(Solid::Capsule), time.clone());
     world.borrow_mut().dead = true;
     let mut bench = Bench::new(eyes, time.clone(), &Shared::default());
+    assert_eq!(bench.device().condition(), Condition::Starting);
     assert_eq!(bench.next_hello().sensors, [0; 2]);
+    assert_eq!(bench.device().condition(), Condition::Faulty);
     assert_eq!(bench.ask(&ToDevice::Calibration(plain())), Ok(()));
     assert_eq!(bench.ask(&ToDevice::Start), Err(ErrorCode::Camera));
     assert_eq!(bench.ask(&ToDevice::Grab(PictureKind::Grey)), Err(ErrorCode::Camera));

@@ -1,129 +1,188 @@
-//! The wire format: what a device writes is what a host reads, and nothing else ever is.
+//! The wire format: what one end writes is what the other reads, in bytes that are frozen, and any bytes give a
+//! message that is safe to use or an error.
+//!
+//! `REGENERATE=1 cargo test -p system-tests --test wire` writes the frozen bytes anew. That is right only
+//! together with a new version of the format: devices in the field do not change with the host.
 
-use heapless::Vec as List;
-use host::calibration::StereoCamera;
-use host::shape::Shape as Solid;
-use host::stage::rectify::Rectification;
-use image::GrayImage;
-use oracle::core::{Core, Picture};
-use oracle::scene::{Pair, drawn_pair, pair};
-use shared::fixed::{ONE, PX, UNIT};
-use shared::pipeline::{Branch, Finding, Outcome, Settings};
-use shared::point::PixelPoint;
-use shared::stage::contour::{ContourLoop, ContourPoint};
-use shared::stage::depth::Optics;
-use shared::stage::nurbs::Control;
-use shared::stage::rows::ContourMatch;
-use shared::wire::{
-    Answer, Capacities, Counters, DISPARITY_STEP, Decoder, ErrorCode, Exposure, ExposureSetting, Frame,
-    Health, Hello, MAX_FRAME, POSITION_STEP, PairReport, PictureKind, PicturePart, ResetReason, Sequence,
-    Shape, ShapeLists, TURN_STEP, ToDevice, ToHost, VERSION, WireError,
+use oracle::link;
+use oracle::raster::Random;
+use oracle::wire::{
+    bytes, command, command_bytes, decode, each_command, each_message, read, report, survive,
 };
-use std::path::{Path, PathBuf};
+use proptest::prelude::*;
+use shared::bitmap::{Bitmap, Size};
+use shared::limits::CapacityError;
+use shared::pipeline::Finding;
+use shared::wire::{
+    PairReport, PictureKind, ToDevice, ToHost, VERSION, WireError, calibration_crc, pack_mask,
+};
+use std::path::Path;
 
-/// Lists that a shape is read into.
-#[derive(Default)]
-struct Lists {
-    contour: Box<List<ContourPoint, 8192>>,
-    loops: List<ContourLoop, 64>,
-    matches: Box<List<ContourMatch, 8192>>,
-    hulls: [Box<List<PixelPoint, 1024>>; 2],
-    branches: List<Branch, 256>,
-    controls: Box<List<Control, 4096>>,
-    outcome: Outcome,
-}
-
-impl Lists {
-    fn lend(&mut self) -> ShapeLists<'_> {
-        let [left, right] = &mut self.hulls;
-        ShapeLists {
-            contour: &mut *self.contour,
-            loops: &mut self.loops,
-            matches: &mut *self.matches,
-            hulls: [&mut **left, &mut **right],
-            branches: &mut self.branches,
-            controls: &mut *self.controls,
-            outcome: &mut self.outcome,
-        }
+#[test]
+fn the_bytes_of_every_message_are_frozen() {
+    let hex = |bytes: &[u8]| bytes.iter().map(|b| format!("{b:02x}")).collect::<String>();
+    let mut found =
+        String::from("# Frames of version 1, as tests/oracle/src/wire.rs names them.\n\n# to the host\n");
+    each_message(|name, message| found += &format!("{name}: {}\n", hex(&bytes(&message))));
+    found += "\n# to the device\n";
+    for (name, command) in each_command() {
+        found += &format!("{name}: {}\n", hex(&command_bytes(&command)));
     }
-}
-
-/// What the device's core makes of a pair, handed to `look`, or its refusal.
-fn describe<R>(pair: &Pair, optics: Optics, look: impl FnOnce(Shape<'_>) -> R) -> Result<R, Finding> {
-    let pictures: [Picture; 2] = pair
-        .each_ref()
-        .map(|image| image.as_raw().chunks(image.width() as usize).map(<[u8]>::to_vec).collect());
-    let settings = Settings { sub_pixel: false, ..Settings::new(optics) };
-    let mut seen = None;
-    Core::default().run([&pictures[0], &pictures[1]], &settings, "", &mut (), |memory, outcome| {
-        seen = Some(look(Shape::of(memory, outcome)));
-    })?;
-    Ok(seen.unwrap())
-}
-
-fn report(result: Result<Shape<'_>, Finding>) -> ToHost<'_> {
-    ToHost::Pair(PairReport {
-        number: 7,
-        stamps: [1_000_000, 1_000_012],
-        levels: [96, 101],
-        exposures: [Exposure { lines: 400, gain: 256 }, Exposure { lines: 380, gain: 300 }],
-        result,
-    })
-}
-
-/// The frame of a message.
-fn bytes(message: &ToHost<'_>) -> Vec<u8> {
-    let mut out = vec![0; 1 << 16];
-    let len = message.encode(1, &mut out).unwrap();
-    out.truncate(len);
-    out
-}
-
-/// Hand every frame of a stream to `take`.
-fn receive(stream: &[u8], mut take: impl FnMut(Frame<'_>)) -> Counters {
-    let mut buffer = vec![0; MAX_FRAME];
-    let mut decoder = Decoder::new(&mut buffer);
-    for byte in stream {
-        if let Some(frame) = decoder.push(*byte) {
-            take(frame);
-        }
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/frozen/wire.txt");
+    if std::env::var_os("REGENERATE").is_some() {
+        std::fs::write(file, &found).unwrap();
     }
-    *decoder.counters()
+    assert_eq!(
+        found,
+        std::fs::read_to_string(file).unwrap_or_default(),
+        "devices in the field do not change"
+    );
 }
 
 #[test]
-fn probe() {
-    let cases = Path::new("/work/shared/eval/cases");
-    let mut names: Vec<PathBuf> = std::fs::read_dir(cases).unwrap().map(|e| e.unwrap().path()).collect();
-    names.sort();
-    for case in names {
-        let open = |name: &str| image::open(case.join(name)).unwrap().to_luma8();
-        let calibration = StereoCamera::read(case.join("calib.yaml")).unwrap();
-        let rectification = Rectification::whole(&calibration).unwrap();
-        let camera = rectification.camera();
-        let pair = rectification.images(open("left.png"), open("right.png")).unwrap();
-        let optics = Optics {
-            focal: (camera.f * 128.0) as i32,
-            disparity_offset: (camera.disparity_offset() * 128.0) as i32,
+fn the_worked_bytes_of_the_document_are_right() {
+    let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/wire-format.md");
+    let page = std::fs::read_to_string(page).unwrap();
+    let byte = |word: &str| u8::from_str_radix(word, 16).ok().filter(|_| word.len() == 2);
+    let rows = page.lines().filter(|line| line.starts_with("00 ") && line.ends_with(" 00"));
+    let worked: Vec<Vec<u8>> = rows.map(|line| line.split(' ').map_while(byte).collect()).collect();
+    let mut all: Vec<Vec<u8>> = each_command().iter().map(|(_, c)| command_bytes(c)).collect();
+    each_message(|_, message| all.push(bytes(&message)));
+    assert!(worked.len() >= 3 && worked.iter().all(|frame| all.contains(frame)), "{worked:02x?}");
+}
+
+#[test]
+fn every_message_comes_back() {
+    each_message(|name, message| {
+        let sent = bytes(&message);
+        let [(kind, 1, payload)] = &link::frames(&sent)[..] else {
+            panic!("{name} is no frame: {sent:02x?}")
         };
-        let pair = pair.map(|p| halved(&p));
-        let r = describe(&pair, optics, |shape| {
-            let b = bytes(&report(Ok(shape)));
-            (
-                b.len(),
-                shape.contour.len(),
-                shape.hulls.map(<[_]>::len),
-                shape.branches.len(),
-                shape.controls.len(),
-            )
+        assert_eq!(link::frame(*kind, 1, payload), sent, "{name}");
+        read(&sent, |read| match (read.unwrap(), message) {
+            (ToHost::Pair(read), ToHost::Pair(sent)) if sent.result.is_ok() => {
+                // Of shapes, tests/wire_shape.rs.
+                assert_eq!(PairReport { result: sent.result, ..read }, sent);
+            }
+            (read, sent) => assert_eq!(read, sent, "{name}"),
         });
-        println!("{} {:?} {r:?}", case.display(), pair[0].dimensions());
+        // What a newer device appends does not matter; what is cut off does.
+        let longer = [payload.as_slice(), &[1, 2, 3]].concat();
+        decode(*kind, &longer, |read| assert!(read.is_ok(), "{name}: {read:?}"));
+        for len in 0..payload.len() {
+            decode(*kind, &payload[..len], |read| assert_eq!(read, Err(WireError::Short), "{name} of {len}"));
+        }
+    });
+    for (name, sent) in each_command() {
+        let frames = link::frames(&command_bytes(&sent));
+        let [(kind, 1, payload)] = &frames[..] else { panic!("{name} is no frame") };
+        assert_eq!(command(*kind, &[payload.as_slice(), &[9]].concat()), Ok(sent), "{name}");
+        for len in 0..payload.len() {
+            assert_eq!(command(*kind, &payload[..len]), Err(WireError::Short), "{name} of {len}");
+        }
+        if let ToDevice::Calibration(model) = sent {
+            assert_eq!(calibration_crc(&model), link::crc32(payload));
+        }
     }
 }
 
-fn halved(image: &GrayImage) -> GrayImage {
-    GrayImage::from_fn(image.width() / 2, image.height() / 2, |u, v| {
-        let at = |k: u32| u32::from(image.get_pixel(2 * u + k % 2, 2 * v + k / 2)[0]);
-        image::Luma([(((0..4).map(at).sum::<u32>() + 2) / 4) as u8])
-    })
+#[test]
+fn another_version_is_named() {
+    let other = (VERSION + 1).to_le_bytes();
+    let theirs = VERSION + 1;
+    decode(1, &other, |read| assert_eq!(read, Err(WireError::Version { theirs })));
+    assert_eq!(command(0x81, &other), Err(WireError::Version { theirs }));
+    let sentence = WireError::Version { theirs }.to_string();
+    assert!(
+        sentence.contains(&format!("version {VERSION}")) && sentence.contains(&format!("version {theirs}"))
+    );
+    decode(0x60, &[], |read| {
+        assert_eq!(read, Err(WireError::Unknown { what: "message type", code: 0x60 }));
+    });
+    assert_eq!(command(0x60, &[]), Err(WireError::Unknown { what: "command", code: 0x60 }));
+}
+
+#[test]
+fn what_a_capacity_is_about_comes_back_by_name() {
+    fn visit(folder: &Path, take: &mut impl FnMut(&str)) {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                visit(&path, take);
+            } else if !path.parent().unwrap().ends_with("wire") {
+                take(std::fs::read_to_string(path).unwrap().split("#[cfg(test)]").next().unwrap());
+            }
+        }
+    }
+    let mut names = 0;
+    visit(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/src"), &mut |code| {
+        let direct = code.split("what: \"").skip(1);
+        let pushed = code.split("push(").skip(1).filter_map(|call| call.split(';').next()?.split_once('"'));
+        for text in direct.chain(pushed.map(|(_, text)| text)) {
+            // The compiler keeps one copy of each text for good; so does the test.
+            let what: &'static str = text.split('"').next().unwrap().to_owned().leak();
+            let finding = Finding::Capacity(CapacityError { what, limit: 5 });
+            read(&bytes(&report(Err(finding))), |read| {
+                assert_eq!(read, Ok(report(Err(finding))), "{what} has no code in wire/finding.rs");
+            });
+            names += 1;
+        }
+    });
+    assert!(names > 30, "{names} lists");
+}
+
+#[test]
+fn a_mask_is_packed_row_by_row() {
+    let mut random = Random(4);
+    for width in [1, 7, 8, 31, 32, 33, 64, 65, 100] {
+        let size = Size::new(width, 3).unwrap();
+        let mut words = vec![0; size.words()];
+        let mut mask = Bitmap::new(size, &mut words).unwrap();
+        (0..3 * width).for_each(|i| mask.put(i % width, i / width, random.below(2) == 1));
+        let mut out = [0; 16];
+        for v in 0..3 {
+            let packed = pack_mask(&mask, v, &mut out).unwrap();
+            assert_eq!(packed.len(), PictureKind::Mask.row_bytes(width as u16));
+            for u in 0..8 * packed.len() {
+                assert_eq!(
+                    packed[u / 8] >> (u % 8) & 1 == 1,
+                    mask.get(u as i32, i32::from(v)),
+                    "{u} of {width}"
+                );
+            }
+        }
+        assert!(pack_mask(&mask, 0, &mut out[..width.div_ceil(8) - 1]).is_err());
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn any_bytes_are_answered(kind in any::<u8>(), payload in proptest::collection::vec(any::<u8>(), 0..600)) {
+        survive(kind, &payload);
+        survive(kind % 6, &payload);
+        survive(0x80 + kind % 12, &payload);
+        oracle::wire::receive(&payload, |frame| survive(frame.kind, frame.payload));
+    }
+
+    #[test]
+    fn spoilt_messages_with_right_check_sums_are_answered(
+        which in any::<proptest::sample::Index>(),
+        changes in proptest::collection::vec((any::<proptest::sample::Index>(), any::<u8>()), 1..6),
+    ) {
+        let mut all: Vec<(u8, u16, Vec<u8>)> =
+            each_command().iter().flat_map(|(_, c)| link::frames(&command_bytes(c))).collect();
+        each_message(|_, message| all.extend(link::frames(&bytes(&message))));
+        // Most bytes of a shape are bits of its lists.
+        let shape = all.iter().max_by_key(|(kind, _, payload)| (*kind == 2, payload.len())).unwrap().clone();
+        let (kind, _, mut payload) = if which.index(2) == 0 { shape } else { which.get(&all).clone() };
+        for (at, value) in &changes {
+            if !payload.is_empty() {
+                let at = at.index(payload.len());
+                payload[at] = *value;
+            }
+        }
+        survive(kind, &payload);
+    }
 }

@@ -11,10 +11,14 @@ pub const WIDTH: usize = 320;
 /// Rows of a picture, px.
 pub const HEIGHT: usize = 240;
 
-/// Columns and rows that the sensor hands to the DSP in SVGA.
+/// COM7: the resolution, SVGA.
+pub const RESOLUTION: u8 = 0x40;
+/// Columns and rows that the sensor hands to the DSP at that resolution.
 const ARRAY: (u16, u16) = (800, 600);
-/// First column and row of the image in SVGA, each counting as two.
+/// First column and row of the image at that resolution, each counting as two.
 const FIRST: (u16, u16) = (137, 2);
+/// How often the DSP halves that before it scales it to the picture.
+const HALVINGS: u8 = (ARRAY.0 / WIDTH as u16).ilog2() as u8;
 
 /// Chooses what the addresses mean, in either bank.
 pub const BANK: u8 = 0xFF;
@@ -31,21 +35,21 @@ pub enum Bank {
 
 // Sensor bank.
 /// Gain: a doubling for each bit of 7:4, times 1 + bits 3:0 / 16.
-pub const GAIN: u8 = 0x00;
+const GAIN: u8 = 0x00;
 /// Bits 3:2 and 1:0: low bits of the last and the first row.
-pub const COM1: u8 = 0x03;
+const COM1: u8 = 0x03;
 /// Bits 7 and 6 mirror and flip; bits 1:0 are exposure 1:0. Bit 5 is set by a reset.
-pub const REG04: u8 = 0x04;
+const REG04: u8 = 0x04;
 /// Product number, high byte.
 pub const PRODUCT_HIGH: u8 = 0x0A;
 /// Product number, low byte.
 pub const PRODUCT_LOW: u8 = 0x0B;
 /// Exposure 9:2, lines.
-pub const AEC: u8 = 0x10;
+const AEC: u8 = 0x10;
 /// Bit 7 resets everything, bits 6:4 choose the resolution (4: SVGA), bit 1 shows colour bars.
 pub const COM7: u8 = 0x12;
 /// Bit 5: banding filter, bit 2: automatic gain, bit 0: automatic exposure.
-pub const COM8: u8 = 0x13;
+const COM8: u8 = 0x13;
 const FIRST_COLUMN: u8 = 0x17;
 const LAST_COLUMN: u8 = 0x18;
 const FIRST_ROW: u8 = 0x19;
@@ -53,12 +57,10 @@ const LAST_ROW: u8 = 0x1A;
 /// Bits 5:3 and 2:0: low bits of the last and the first column; bits 7:6 divide the pixel clock.
 const COLUMN_LOW: u8 = 0x32;
 /// Bits 7:6: gain 9:8; bits 5:0: exposure 15:10.
-pub const EXPOSURE_HIGH: u8 = 0x45;
+const EXPOSURE_HIGH: u8 = 0x45;
 
 /// COM7: reset.
 pub const RESET: u8 = 0x80;
-/// COM7: SVGA.
-pub const SVGA: u8 = 0x40;
 /// COM7: colour bars.
 pub const BARS: u8 = 0x02;
 
@@ -71,12 +73,14 @@ const WINDOW_WIDTH: u8 = 0x51;
 const WINDOW_HEIGHT: u8 = 0x52;
 const OFFSET_X: u8 = 0x53;
 const OFFSET_Y: u8 = 0x54;
+/// Bits 7 and 3: bit 8 of the window's height and width / 4; the others are of its offset.
 const WINDOW_HIGH: u8 = 0x55;
+/// Bit 7: bit 9 of the window's width / 4.
 const WINDOW_HIGHER: u8 = 0x57;
 /// Columns of the output / 4.
-pub const OUTPUT_WIDTH: u8 = 0x5A;
+const OUTPUT_WIDTH: u8 = 0x5A;
 /// Rows of the output / 4.
-pub const OUTPUT_HEIGHT: u8 = 0x5B;
+const OUTPUT_HEIGHT: u8 = 0x5B;
 const OUTPUT_HIGH: u8 = 0x5C;
 /// Bit 5 scales, bit 3 adjusts and bit 2 averages chroma, bit 0 is the colour matrix; 4 is special effects.
 const MODULES2: u8 = 0x86;
@@ -87,10 +91,10 @@ const ARRAY_HEIGHT: u8 = 0xC1;
 const MODULES0: u8 = 0xC2;
 /// Bits 3 and 2: white balance and its gains; the others correct pixels, gamma and lens.
 const MODULES1: u8 = 0xC3;
-/// Bit 7: the pixel clock follows the output size; bits 6:0 divide it.
-const PIXEL_CLOCK: u8 = 0xD3;
+/// Bit 7: the pixel clock follows the output size; bits 6:0 divide it, and may then be the chip's own.
+pub const PIXEL_CLOCK: u8 = 0xD3;
 /// Bit 6: Y8, bit 4: JPEG, bits 3:2: YUV422, raw or RGB565, bit 0: bytes swapped to UYVY.
-pub const IMAGE_MODE: u8 = 0xDA;
+const IMAGE_MODE: u8 = 0xDA;
 /// Bit 2 holds the output in reset.
 const DSP_RESET: u8 = 0xE0;
 
@@ -108,8 +112,8 @@ pub const TABLE: &[(Bank, &[Write])] = &[
     (
         Bank::Sensor,
         &[
-            (COM7, SVGA),
-            // A window of the whole array: SVGA has other bounds than the full size, which a reset gives.
+            (COM7, RESOLUTION),
+            // A window of the whole array: its bounds are other than those of the full size, which a reset gives.
             (FIRST_COLUMN, high(FIRST.0, 3)),
             (LAST_COLUMN, high(LAST.0, 3)),
             (COLUMN_LOW, ((LAST.0 & 7) << 3 | FIRST.0 & 7) as u8),
@@ -129,14 +133,13 @@ pub const TABLE: &[(Bank, &[Write])] = &[
             (ARRAY_HEIGHT, high(ARRAY.1, 3)),
             (ARRAY_LOW, ((ARRAY.0 & 7) << 3 | ARRAY.1 & 7) as u8),
             (MODULES2, 0x2D),
-            // Halves of the array, averaged.
-            (DIVIDE, 0x80 | 1 << 3 | 1),
+            (DIVIDE, 0x80 | HALVINGS << 3 | HALVINGS),
             (WINDOW_WIDTH, high(ARRAY.0, 2)),
             (WINDOW_HEIGHT, high(ARRAY.1, 2)),
             (OFFSET_X, 0),
             (OFFSET_Y, 0),
-            (WINDOW_HIGH, 0),
-            (WINDOW_HIGHER, 0),
+            (WINDOW_HIGH, (high(ARRAY.1, 10) & 1) << 7 | (high(ARRAY.0, 10) & 1) << 3),
+            (WINDOW_HIGHER, (high(ARRAY.0, 11) & 1) << 7),
             (OUTPUT_WIDTH, high(WIDTH as u16, 2)),
             (OUTPUT_HEIGHT, high(HEIGHT as u16, 2)),
             (OUTPUT_HIGH, 0),
@@ -149,14 +152,6 @@ pub const TABLE: &[(Bank, &[Write])] = &[
             (BYPASS, 0),
         ],
     ),
-];
-
-/// What tells a sensor that has the table from one that lost it.
-pub const WITNESSES: &[(Bank, Write)] = &[
-    (Bank::Sensor, (COM8, 0xC0)),
-    (Bank::Dsp, (OUTPUT_WIDTH, high(WIDTH as u16, 2))),
-    (Bank::Dsp, (OUTPUT_HEIGHT, high(HEIGHT as u16, 2))),
-    (Bank::Dsp, (IMAGE_MODE, 0x00)),
 ];
 
 /// The registers of an exposure.

@@ -15,7 +15,7 @@ fn blame(error: &WireError) -> ErrorCode {
     match error {
         WireError::Unknown { what: "command", .. } => ErrorCode::UnknownCommand,
         WireError::Version { .. } => ErrorCode::Version,
-        WireError::Unknown { .. } => ErrorCode::OutOfRange,
+        WireError::Unknown { .. } | WireError::Calibration(_) => ErrorCode::OutOfRange,
         WireError::Short | WireError::Invalid(_) | WireError::Capacity(_) => ErrorCode::Malformed,
     }
 }

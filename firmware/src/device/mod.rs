@@ -124,6 +124,19 @@ enum Eyes {
     Down { due: u64 },
 }
 
+/// What lamps can show of a device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Condition {
+    /// It has not said hello yet.
+    Starting,
+    /// It waits for its host.
+    Ready,
+    /// It takes or describes pictures.
+    Working,
+    /// An eye does not answer; it is tried again and again.
+    Faulty,
+}
+
 /// What the host ordered.
 #[derive(Clone, Copy, Debug, Default)]
 struct Orders {
@@ -225,6 +238,17 @@ impl<'m> Device<'m> {
             Decision::Capture => Action::Capture,
             Decision::Read(side) => Action::Read(side),
             Decision::Rest => Action::Rest,
+        }
+    }
+
+    /// How it stands.
+    pub fn condition(&self) -> Condition {
+        let wanted = self.orders.running || self.orders.grab.is_some() || self.job.is_some();
+        match self.identities {
+            _ if !self.greeted => Condition::Starting,
+            None => Condition::Faulty,
+            Some(_) if wanted => Condition::Working,
+            Some(_) => Condition::Ready,
         }
     }
 

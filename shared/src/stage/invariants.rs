@@ -6,10 +6,12 @@
 //!
 //! * **In**: ordered vertices of a closed polygon.
 //! * **Out**: ratios in 1/65536, clamped to [2^-8, 2^8] because a nearly flat triangle makes them
-//!   explode; or their base-two logarithms in 1/65536, which weigh S_k / S_l like S_l / S_k.
+//!   explode; or their base-two logarithms in 1/65536, which weigh S_k / S_l like S_l / S_k. Along a straight
+//!   side an area is nothing but the noise of its vertices, and its logarithm anything. So what half a
+//!   pixel of height over the quadruplet's longest chord makes is added to all four areas before.
 //! * **Bounds**: areas below 2^44, differences below 2^24, e_omega below 2^54 for omega <= 3.
 
-use crate::fixed::{ONE, log2};
+use crate::fixed::{ONE, PX, log2};
 use crate::point::{PixelPoint, orient};
 
 /// How ratios of areas are compared.
@@ -17,9 +19,12 @@ use crate::point::{PixelPoint, orient};
 pub enum Measure {
     /// By their difference: equation 2 as written.
     Ratio,
-    /// By the difference of their logarithms.
+    /// By the difference of their logarithms, areas below the noise of a vertex taken as alike.
     Logarithm,
 }
+
+/// How far a vertex may be off, 1/256 px.
+const VERTEX_NOISE: i64 = PX as i64 / 2;
 
 /// The six ratios I12, I13, I14, I23, I24, I34 of a quadruplet, 1/65536.
 pub type FeatureVector = [i32; 6];
@@ -35,7 +40,9 @@ pub fn feature_vector(polygon: &[PixelPoint], i: usize, measure: Measure) -> Fea
     let [a, b, c, d] = [0, 1, 2, 3].map(|k| polygon[(i + k) % n]);
     let areas =
         [orient(a, b, c), orient(a, b, d), orient(a, c, d), orient(b, c, d)].map(|s| s.unsigned_abs().max(1));
-    let logarithms = areas.map(log2);
+    let chord = a.distance(c).max(b.distance(d)).max(a.distance(d));
+    let noise = (i64::from(chord) * VERTEX_NOISE) as u64;
+    let logarithms = areas.map(|s| log2(s + noise));
     let mut features = [0; 6];
     let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
     for (feature, (k, l)) in features.iter_mut().zip(pairs) {
@@ -102,8 +109,13 @@ mod tests {
     }
 
     #[test]
-    fn flat_quadruplets_are_clamped() {
+    fn flat_quadruplets_are_clamped_and_their_noise_says_little() {
         let flat = [0, 1, 2, 3].map(|k| PixelPoint { u: k * 4096, v: 0 });
+        let noisy = [0, 1, 2, 3].map(|k| PixelPoint { u: k * 4096, v: [0, 20, -20, 0][k as usize] });
+        for polygon in [flat, noisy] {
+            let logarithms = feature_vector(&polygon, 0, Measure::Logarithm);
+            assert!(logarithms.iter().all(|l| l.abs() < ONE / 4), "{logarithms:?}");
+        }
         assert!(feature_vector(&flat, 0, Measure::Ratio).iter().all(|r| (1 << 8..=1 << 24).contains(r)));
         assert_eq!(feature_vector(&[], 3, Measure::Ratio), [0; 6]);
     }

@@ -79,9 +79,11 @@ pub struct RowStatistics {
     pub unmatched: u32,
 }
 
-/// Cost of leaving a crossing unmatched, 1/256 px; two that lie twice as far apart than the plane says
-/// are therefore never paired.
-const SKIP: i32 = 6 * PX;
+/// Least cost of leaving a crossing unmatched, 1/256 px; two that lie twice as far apart than the plane
+/// says are therefore never paired.
+const LEAST_SKIP: i32 = 6 * PX;
+/// That cost as a part of the object: how far a limb stands off the plane grows with the picture of it.
+const SKIP_SHARE: i32 = 32;
 /// Matches with a flatter normal than this say nothing about disparity (|n_x| in 1/16384).
 const MIN_NX: i32 = UNIT / 4;
 /// A match this far from the running median along the contour is a wrong one, 1/256 px.
@@ -221,11 +223,12 @@ pub fn match_rows(
         let blank = ContourMatch { disparity: plane.at(p.at), weight: 0, normal_right: p.normal };
         push(matches, blank, "contour matches")?;
     }
+    let skip = skip_cost(left_points);
     let mut statistics = RowStatistics::default();
     for v in 0..left.len() {
         let (a, b) = (left.matched(v), right.matched(v));
         let mut known = 0;
-        align(a, b, plane, |i, j| {
+        align((a, b), plane, skip, |i, j| {
             known += u32::from(!left_points[a[i].index as usize].border);
             record(&a[i], &b[j], left_points, right_points, matches);
         });
@@ -249,8 +252,22 @@ pub fn match_rows(
     Ok(statistics)
 }
 
-/// Align two rows of crossings in order at the least cost, and report the pairs.
-fn align(a: &[RowCrossing], b: &[RowCrossing], plane: &ImagePlane, mut pair: impl FnMut(usize, usize)) {
+/// Cost of leaving a crossing unmatched, 1/256 px: a part of the mean of the contour's width and height.
+fn skip_cost(points: &[ContourPoint]) -> i32 {
+    let span = |of: fn(&ContourPoint) -> i32| {
+        points.iter().map(of).max().unwrap_or(0) - points.iter().map(of).min().unwrap_or(0)
+    };
+    ((span(|p| p.at.u) + span(|p| p.at.v)) / (2 * SKIP_SHARE)).max(LEAST_SKIP)
+}
+
+/// Align two rows of crossings in order at the least cost, and report the pairs; `skip` is the cost of
+/// leaving one out.
+fn align(
+    (a, b): (&[RowCrossing], &[RowCrossing]),
+    plane: &ImagePlane,
+    skip: i32,
+    mut pair: impl FnMut(usize, usize),
+) {
     #[derive(Clone, Copy, PartialEq)]
     enum Step {
         Pair,
@@ -261,18 +278,18 @@ fn align(a: &[RowCrossing], b: &[RowCrossing], plane: &ImagePlane, mut pair: imp
     let mut cost = [0i32; N];
     let mut steps = [[Step::SkipRight; N]; N];
     for (j, c) in cost.iter_mut().enumerate() {
-        *c = j as i32 * SKIP;
+        *c = j as i32 * skip;
     }
     for (i, x) in a.iter().enumerate() {
         let expected = x.u - plane.at(PixelPoint { u: x.u, v: i32::from(x.v) * PX });
         let mut diagonal = cost[0];
-        cost[0] += SKIP;
+        cost[0] += skip;
         steps[i + 1][0] = Step::SkipLeft;
         for (j, y) in b.iter().enumerate() {
             let above = cost[j + 1];
-            let (mut best, mut step) = (above + SKIP, Step::SkipLeft);
-            if cost[j] + SKIP < best {
-                (best, step) = (cost[j] + SKIP, Step::SkipRight);
+            let (mut best, mut step) = (above + skip, Step::SkipLeft);
+            if cost[j] + skip < best {
+                (best, step) = (cost[j] + skip, Step::SkipRight);
             }
             let together = diagonal + (y.u - expected).abs();
             if x.heading == y.heading && together <= best {

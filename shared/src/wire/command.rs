@@ -3,7 +3,8 @@
 use super::bytes::Reader;
 use super::calibration::{read_calibration, write_calibration};
 use super::frame::{Frame, Writer};
-use super::message::{Exposure, check_version};
+use super::hello::check_version;
+use super::message::Exposure;
 use super::picture::PictureKind;
 use super::{VERSION, WireError};
 use crate::camera::PairModel;

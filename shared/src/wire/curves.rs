@@ -1,14 +1,14 @@
 //! A shape's branches with their curves.
 //!
 //! ```text
-//! each branch:  nodes 2 x 16 bits | closed 1 | weighted 1 | control points 10
+//! each branch:  both nodes | number of control points | closed 1 bit | weighted 1
 //! each control: u, v | radius | disparity beyond the plane | weight 32 bits where weighted
 //! ```
 //!
 //! A curve that is not weighted has unit weights, as every fit gives them.
 
 use super::WireError;
-use super::outline::{Positions, disparity, excess, length, sent, steps};
+use super::outline::{disparity, excess, length, sent, steps};
 use super::rice::{BitReader, BitWriter, Channel, Expect};
 use super::shape::{POSITION_STEP, Shape, ShapeLists};
 use crate::fixed::ONE;
@@ -16,29 +16,43 @@ use crate::limits::{CapacityError, push};
 use crate::pipeline::Branch;
 use crate::point::PixelPoint;
 use crate::stage::branch::Ball;
-use crate::stage::nurbs::{Control, MAX_CONTROLS, Nurbs};
+use crate::stage::nurbs::Control;
 use crate::stage::plane::ImagePlane;
 
-/// Bits of a number of control points.
-const COUNT_BITS: u32 = 10;
-const _: () = assert!(MAX_CONTROLS < 1 << COUNT_BITS);
+/// A control point in numbers to send: u, v, radius, disparity beyond the plane.
+type Numbers = [i32; 4];
+
+fn numbers(ball: Ball, plane: &ImagePlane) -> Numbers {
+    let [u, v, rho] = [ball.u, ball.v, ball.rho].map(|x| steps(x, POSITION_STEP));
+    [u, v, rho, excess(ball.d, sent(ball.at()), plane)]
+}
+
+fn ball([u, v, rho, excess]: Numbers, plane: &ImagePlane) -> Result<Ball, WireError> {
+    let (u, v, rho) = (length(u)?, length(v)?, length(rho)?);
+    Ok(Ball { u, v, rho, d: disparity(excess, PixelPoint { u, v }, plane) })
+}
 
 struct Curves {
-    positions: Positions,
-    radii: Channel,
-    excesses: Channel,
+    nodes: Channel,
+    counts: Channel,
+    channels: [Channel; 4],
 }
 
 impl Curves {
     fn new() -> Self {
-        let channel = || Channel::new(Expect::Onward);
-        Self { positions: Positions::new(Expect::Onward), radii: channel(), excesses: channel() }
+        let unsteady = || Channel::new(Expect::Same);
+        let channels = [(); 4].map(|()| Channel::new(Expect::Onward));
+        Self { nodes: unsteady(), counts: unsteady(), channels }
     }
 
-    const fn restart(&mut self) {
-        self.positions.restart();
-        self.radii.restart();
-        self.excesses.restart();
+    fn node(&mut self, bits: &mut BitReader<'_, '_>) -> Result<u16, WireError> {
+        u16::try_from(self.nodes.read(bits)?).map_err(|_| WireError::Invalid("node"))
+    }
+
+    fn restart(&mut self) {
+        for channel in &mut self.channels {
+            channel.restart();
+        }
     }
 }
 
@@ -54,16 +68,16 @@ pub(super) fn write_branches(
         let controls = branch.curve(shape.controls).ok_or(missing)?.controls();
         let weighted = controls.iter().any(|c| c.weight != ONE);
         for node in branch.nodes {
-            bits.put(u32::from(node), 16);
+            curves.nodes.write(node.into(), bits);
         }
+        curves.counts.write(controls.len() as i32, bits);
         bits.put(u32::from(branch.closed), 1);
         bits.put(u32::from(weighted), 1);
-        bits.put(controls.len() as u32, COUNT_BITS);
         curves.restart();
         for Control { ball, weight } in controls {
-            curves.positions.write(ball.at(), bits);
-            curves.radii.write(steps(ball.rho, POSITION_STEP), bits);
-            curves.excesses.write(excess(ball.d, sent(ball.at()), plane), bits);
+            for (channel, x) in curves.channels.iter_mut().zip(numbers(*ball, plane)) {
+                channel.write(x, bits);
+            }
             if weighted {
                 bits.put(*weight as u32, 32);
             }
@@ -81,19 +95,22 @@ pub(super) fn read_branches(
 ) -> Result<(), WireError> {
     let mut curves = Curves::new();
     for _ in 0..branches {
-        let nodes = [bits.take(16)? as u16, bits.take(16)? as u16];
+        let nodes = [curves.node(bits)?, curves.node(bits)?];
+        let count = curves.counts.read(bits)?;
         let (closed, weighted) = (bits.flag()?, bits.flag()?);
-        let (controls, control_count) = (lists.controls.len(), bits.take(COUNT_BITS)? as usize);
+        let controls = lists.controls.len();
         curves.restart();
-        for _ in 0..control_count {
-            let at @ PixelPoint { u, v } = curves.positions.read(bits)?;
-            let rho = length(&mut curves.radii, bits)?;
-            let d = disparity(curves.excesses.read(bits)?, at, plane);
+        for _ in 0..count {
+            let mut numbers = Numbers::default();
+            for (channel, x) in curves.channels.iter_mut().zip(&mut numbers) {
+                *x = channel.read(bits)?;
+            }
             let weight = if weighted { bits.take(32)? as i32 } else { ONE };
-            push(lists.controls, Control { ball: Ball { u, v, rho, d }, weight }, "control points")?;
+            push(lists.controls, Control { ball: ball(numbers, plane)?, weight }, "control points")?;
         }
+        let control_count = lists.controls.len() - controls;
         let branch = Branch { nodes, samples: 0, sample_count: 0, controls, control_count, closed };
-        if branch.curve(lists.controls).as_ref().map(Nurbs::closed) != Some(closed) {
+        if branch.curve(lists.controls).is_none() {
             return Err(WireError::Invalid("number of control points"));
         }
         push(lists.branches, branch, "branches")?;

@@ -1,6 +1,7 @@
 //! Why a frame is no message.
 
 use super::VERSION;
+use crate::camera::CameraError;
 use crate::limits::CapacityError;
 use core::fmt;
 
@@ -23,6 +24,8 @@ pub enum WireError {
     Short,
     /// A field holds what no sender writes.
     Invalid(&'static str),
+    /// A calibration that no pair of cameras has.
+    Calibration(CameraError),
     /// The shape needs longer lists than were lent.
     Capacity(CapacityError),
 }
@@ -46,6 +49,7 @@ impl fmt::Display for WireError {
             }
             Self::Short => write!(f, "a message ends before its last field"),
             Self::Invalid(what) => write!(f, "a message with an impossible {what}"),
+            Self::Calibration(error) => write!(f, "{error}"),
             Self::Capacity(error) => write!(f, "a shape of {error}"),
         }
     }

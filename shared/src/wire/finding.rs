@@ -9,7 +9,7 @@ use crate::limits::CapacityError;
 use crate::pipeline::{Finding, Side};
 
 /// What a [`CapacityError`] can be about, by its code; code 0 is anything else. Names are appended.
-const LISTS: [&str; 31] = [
+const LISTS: [&str; 32] = [
     "memory",
     "ball depths",
     "balls",
@@ -41,6 +41,7 @@ const LISTS: [&str; 31] = [
     "tips",
     "words in a bitmap",
     "words of scratch",
+    "knots",
 ];
 
 pub(super) const fn side_code(side: Side) -> u32 {

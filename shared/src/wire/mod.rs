@@ -21,19 +21,20 @@ mod error;
 mod figures;
 mod finding;
 mod frame;
+mod hello;
 mod message;
 mod outline;
 mod picture;
 mod rice;
 mod shape;
+mod walk;
 
 pub use calibration::calibration_crc;
 pub use command::{ExposureSetting, ToDevice};
 pub use error::WireError;
 pub use frame::{Counters, Decoder, Frame, Sequence};
-pub use message::{
-    Answer, Capacities, ErrorCode, Exposure, Health, Hello, MAX_BOARD, PairReport, ResetReason, ToHost,
-};
+pub use hello::{Capacities, Hello, MAX_BOARD, ResetReason};
+pub use message::{Answer, ErrorCode, Exposure, Health, PairReport, ToHost};
 pub use picture::{PictureKind, PicturePart, pack_mask};
 pub use shape::{DISPARITY_STEP, POSITION_STEP, Shape, ShapeLists, TURN_STEP};
 

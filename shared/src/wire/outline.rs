@@ -1,8 +1,9 @@
 //! A shape's contour with its matches, loop by loop, and plain rows of points.
 //!
 //! ```text
-//! each loop:  points 16 bits | touches the border 1 | was matched 1
-//! each point: u, v | border 1 where the loop touches it | disparity beyond the plane, turn where matched
+//! each loop: number of points 16 bits | was matched 1 | touches the border 1; where it does: at first 1
+//!            each point: u, v; where a loop that touches goes on to the border or off it: for how long
+//!            each point of a loop that was matched: disparity beyond the plane, turn
 //! ```
 //!
 //! Both sides take disparities and turns relative to what the reader has: the plane at the position that was
@@ -10,8 +11,9 @@
 //! normals need the whole loop: its positions come first, then its matches.
 
 use super::WireError;
-use super::rice::{BitReader, BitWriter, Channel, Expect};
+use super::rice::{BitReader, BitWriter, Channel, Expect, Rice};
 use super::shape::{DISPARITY_STEP, POSITION_STEP, RANGE, Shape, ShapeLists, TURN_STEP};
+use super::walk::Walk;
 use crate::fixed::{div_round, saturate};
 use crate::limits::{CapacityError, push};
 use crate::point::{Direction, PixelPoint};
@@ -24,35 +26,9 @@ pub(super) fn steps(x: i32, step: i32) -> i32 {
     div_round(i64::from(x.clamp(-RANGE, RANGE)), i64::from(step)) as i32
 }
 
-/// A position that is sent: rows of points share the channels of u and v.
-pub(super) struct Positions {
-    u: Channel,
-    v: Channel,
-}
-
-impl Positions {
-    pub(super) const fn new(expect: Expect) -> Self {
-        Self { u: Channel::new(expect), v: Channel::new(expect) }
-    }
-
-    pub(super) const fn restart(&mut self) {
-        self.u.restart();
-        self.v.restart();
-    }
-
-    pub(super) fn write(&mut self, p: PixelPoint, bits: &mut BitWriter<'_, '_>) {
-        self.u.write(steps(p.u, POSITION_STEP), bits);
-        self.v.write(steps(p.v, POSITION_STEP), bits);
-    }
-
-    pub(super) fn read(&mut self, bits: &mut BitReader<'_, '_>) -> Result<PixelPoint, WireError> {
-        Ok(PixelPoint { u: length(&mut self.u, bits)?, v: length(&mut self.v, bits)? })
-    }
-}
-
-/// The next coordinate or radius of a channel, 1/256 px.
-pub(super) fn length(channel: &mut Channel, bits: &mut BitReader<'_, '_>) -> Result<i32, WireError> {
-    let x = channel.read(bits)?.checked_mul(POSITION_STEP);
+/// A coordinate or radius of so many steps, 1/256 px.
+pub(super) fn length(steps: i32) -> Result<i32, WireError> {
+    let x = steps.checked_mul(POSITION_STEP);
     x.filter(|x| (-RANGE..=RANGE).contains(x)).ok_or(WireError::Invalid("position"))
 }
 
@@ -80,7 +56,7 @@ pub(super) fn write_contour(
     plane: &ImagePlane,
     bits: &mut BitWriter<'_, '_>,
 ) -> Result<(), CapacityError> {
-    let mut positions = Positions::new(Expect::Onward);
+    let (mut positions, mut runs) = (Walk::new(), Rice::new(1 << 6));
     let (mut excesses, mut turns) = (Channel::new(Expect::Onward), Channel::new(Expect::Onward));
     let missing = CapacityError { what: "contour points", limit: shape.contour.len() };
     let (mut contour, mut matches) = (shape.contour, shape.matches);
@@ -92,13 +68,18 @@ pub(super) fn write_contour(
         let touches = points.iter().any(|p| p.border);
         let known = matched.iter().any(|m| m.weight > 0);
         bits.put(u32::from(len), 16);
-        bits.put(u32::from(touches), 1);
         bits.put(u32::from(known), 1);
+        bits.put(u32::from(touches), 1);
+        if touches {
+            bits.put(u32::from(points.first().is_some_and(|p| p.border)), 1);
+        }
         positions.restart();
-        for p in points {
-            positions.write(p.at, bits);
+        for run in points.chunk_by(|p, q| p.border == q.border) {
             if touches {
-                bits.put(u32::from(p.border), 1);
+                runs.write(run.len() as i32, bits);
+            }
+            for p in run {
+                positions.write([p.at.u, p.at.v].map(|x| steps(x, POSITION_STEP)), bits);
             }
         }
         if known {
@@ -122,18 +103,24 @@ pub(super) fn read_contour(
     plane: &ImagePlane,
     bits: &mut BitReader<'_, '_>,
 ) -> Result<(), WireError> {
-    let mut positions = Positions::new(Expect::Onward);
+    let (mut positions, mut runs) = (Walk::new(), Rice::new(1 << 6));
     let (mut excesses, mut turns) = (Channel::new(Expect::Onward), Channel::new(Expect::Onward));
     for _ in 0..loops {
         let here = ContourLoop { start: lists.contour.len(), len: bits.take(16)? as usize };
         if here.len < MIN_LOOP {
             return Err(WireError::Invalid("contour loop"));
         }
-        let (touches, known) = (bits.flag()?, bits.flag()?);
+        let known = bits.flag()?;
+        let (mut border, mut run) = if bits.flag()? { (!bits.flag()?, 0) } else { (false, i32::MAX) };
         positions.restart();
         for _ in here.range() {
-            let at = positions.read(bits)?;
-            let border = touches && bits.flag()?;
+            if run == 0 {
+                run = runs.read(bits)?;
+                border = !border;
+            }
+            run = run.saturating_sub(1);
+            let [u, v] = positions.read(bits)?;
+            let at = PixelPoint { u: length(u)?, v: length(v)? };
             push(lists.contour, ContourPoint { at, normal: Direction::default(), border }, "contour points")?;
         }
         push(lists.loops, here, "contour loops")?;
@@ -155,9 +142,10 @@ pub(super) fn read_contour(
 
 /// Append a row of points.
 pub(super) fn write_points(points: &[PixelPoint], bits: &mut BitWriter<'_, '_>) {
-    let mut positions = Positions::new(Expect::Same);
+    let (mut u, mut v) = (Channel::new(Expect::Same), Channel::new(Expect::Same));
     for p in points {
-        positions.write(*p, bits);
+        u.write(steps(p.u, POSITION_STEP), bits);
+        v.write(steps(p.v, POSITION_STEP), bits);
     }
 }
 
@@ -167,9 +155,9 @@ pub(super) fn read_points(
     bits: &mut BitReader<'_, '_>,
     mut take: impl FnMut(PixelPoint) -> Result<(), CapacityError>,
 ) -> Result<(), WireError> {
-    let mut positions = Positions::new(Expect::Same);
+    let (mut u, mut v) = (Channel::new(Expect::Same), Channel::new(Expect::Same));
     for _ in 0..count {
-        take(positions.read(bits)?)?;
+        take(PixelPoint { u: length(u.read(bits)?)?, v: length(v.read(bits)?)? })?;
     }
     Ok(())
 }

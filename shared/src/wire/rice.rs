@@ -2,8 +2,8 @@
 //!
 //! * **In, out**: any `i32`s, in the same order on both sides.
 //! * **How**: a number is folded to 0, -1, 1, -2, .. and split at k bits; the upper part is written in
-//!   unary, the lower one as it is (Rice 1979). k follows the mean of the numbers before, as in JPEG-LS,
-//!   so nothing has to be chosen. An upper part of 20 or more is an escape for 32 plain bits.
+//!   unary, the lower one as it is (Rice 1979). k follows the mean of the numbers before, much as in
+//!   JPEG-LS, so nothing has to be chosen. An upper part of 20 or more is an escape for 32 plain bits.
 //! * A [`Channel`] first takes away what the numbers before foretell.
 //! * **Order of bits**: the lowest of a byte first; the last byte is filled up with zeros.
 //! * **Cost**: a few shifts a number, one step a unary bit. A number takes 52 bits at most.
@@ -79,21 +79,22 @@ impl<'r, 'a> BitReader<'r, 'a> {
     }
 }
 
-/// How large the numbers of one kind have been.
+/// Numbers of one kind, and how large they have been.
 #[derive(Clone, Copy)]
-struct Rice {
+pub(super) struct Rice {
     sum: u32,
     count: u32,
 }
 
 impl Rice {
-    const fn new() -> Self {
-        Self { sum: 8, count: 1 }
+    /// Nothing was seen yet, but numbers of about this size, when folded, are to be expected.
+    pub(super) const fn new(size: u32) -> Self {
+        Self { sum: size, count: 1 }
     }
 
-    /// k: the least for which 2^k is not below the mean.
+    /// k: the least for which 2^k is not below 5/8 of the mean, about its median.
     fn low_bits(self) -> u32 {
-        (0..24).find(|k| self.count << k >= self.sum).unwrap_or(24)
+        (0..24).find(|k| self.count << (k + 3) >= 5 * self.sum).unwrap_or(24)
     }
 
     fn learn(&mut self, folded: u32) {
@@ -104,7 +105,7 @@ impl Rice {
         }
     }
 
-    fn write(&mut self, x: i32, bits: &mut BitWriter<'_, '_>) {
+    pub(super) fn write(&mut self, x: i32, bits: &mut BitWriter<'_, '_>) {
         let folded = ((x << 1) ^ (x >> 31)) as u32;
         let k = self.low_bits();
         let high = folded >> k;
@@ -118,7 +119,7 @@ impl Rice {
         self.learn(folded);
     }
 
-    fn read(&mut self, bits: &mut BitReader<'_, '_>) -> Result<i32, WireError> {
+    pub(super) fn read(&mut self, bits: &mut BitReader<'_, '_>) -> Result<i32, WireError> {
         let k = self.low_bits();
         let mut high = 0;
         while high < ESCAPE && bits.take(1)? == 0 {
@@ -145,17 +146,21 @@ pub(super) struct Channel {
     /// The last number and the one before, and how many of this curve there were.
     past: [i32; 2],
     known: u32,
-    /// Of the first numbers of each curve, and of all others.
-    starts: Rice,
-    steps: Rice,
+    /// Of the first numbers of curves, of the second ones, of all others.
+    kinds: [Rice; 3],
 }
 
 impl Channel {
     pub(super) const fn new(expect: Expect) -> Self {
-        Self { expect, past: [0; 2], known: 0, starts: Rice::new(), steps: Rice::new() }
+        Self {
+            expect,
+            past: [0; 2],
+            known: 0,
+            kinds: [Rice::new(1 << 12), Rice::new(1 << 8), Rice::new(1 << 4)],
+        }
     }
 
-    /// Another curve begins.
+    /// Another curve begins; the first guess is where the last one ended.
     pub(super) const fn restart(&mut self) {
         self.known = 0;
     }
@@ -181,11 +186,12 @@ impl Channel {
     }
 
     const fn rice(&mut self) -> &mut Rice {
-        let first = match self.expect {
-            Expect::Same => 1,
-            Expect::Onward => 2,
-        };
-        if self.known < first { &mut self.starts } else { &mut self.steps }
+        let [first, second, others] = &mut self.kinds;
+        match self.known {
+            0 => first,
+            1 => second,
+            _ => others,
+        }
     }
 
     const fn note(&mut self, x: i32) {

@@ -30,8 +30,8 @@ use heapless::VecView;
 pub const POSITION_STEP: i32 = 8;
 /// Resolution of disparities: 1/64 px, in 1/256 px.
 pub const DISPARITY_STEP: i32 = 4;
-/// Resolution of the turn between the normals of both views, as its sine in 1/16384: 0.22 degrees.
-pub const TURN_STEP: i32 = 64;
+/// Resolution of the turn between the normals of both views, as its sine in 1/16384: 0.9 degrees.
+pub const TURN_STEP: i32 = 256;
 
 /// Largest magnitude of a coordinate, 1/256 px.
 pub(super) const RANGE: i32 = 1 << 20;

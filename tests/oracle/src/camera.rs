@@ -139,6 +139,8 @@ impl SpiDevice for PictureBus {
         if self.chip.borrow_mut().is_broken() {
             return Err(spi::ErrorKind::Other);
         }
+        let begins = !matches!(operations.first(), Some(Operation::Read(_)));
+        assert!(begins, "a transaction begins with its command, not with reading");
         // Selecting and releasing the chip.
         self.time.pass(1000);
         for operation in operations {

@@ -3,6 +3,7 @@
 //! The eyes keep to their contract and panic where a device does not; link, flash and eyes break to order.
 
 use crate::camera::{SIZE, Scene, Time};
+use crate::wire::Lists;
 use embedded_hal::delay::DelayNs;
 use firmware::device::{Birth, Desk, Device};
 use firmware::drive::{Pace, Ports, step};
@@ -11,7 +12,6 @@ use firmware::ports::{
     CameraError, CameraFault, CameraPair, Clock, Exposure, Flash, FlashError, Identity, Link, LinkError,
     Side, Stamps, Watchdog,
 };
-use heapless::Vec as List;
 use shared::pipeline::{Branch, Finding, Outcome};
 use shared::point::PixelPoint;
 use shared::stage::contour::{ContourLoop, ContourPoint};
@@ -20,7 +20,7 @@ use shared::stage::rows::ContourMatch;
 use shared::stage::warp::knots;
 use shared::wire::{
     self, Answer, Counters, Decoder, ErrorCode, Health, Hello, MAX_FRAME, PictureKind, ResetReason, Sequence,
-    Shape, ShapeLists, ToDevice, ToHost,
+    Shape, ToDevice, ToHost,
 };
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -295,33 +295,6 @@ pub enum Heard {
     Answer(Answer),
 }
 
-/// Lists that shapes are read into.
-#[derive(Default)]
-struct Lists {
-    contour: Box<List<ContourPoint, 4096>>,
-    loops: List<ContourLoop, 64>,
-    matches: Box<List<ContourMatch, 4096>>,
-    hulls: [Box<List<PixelPoint, 1024>>; 2],
-    branches: List<Branch, 64>,
-    controls: Box<List<Control, 1024>>,
-    outcome: Outcome,
-}
-
-impl Lists {
-    fn lend(&mut self) -> ShapeLists<'_> {
-        let [left, right] = &mut self.hulls;
-        ShapeLists {
-            contour: &mut *self.contour,
-            loops: &mut self.loops,
-            matches: &mut *self.matches,
-            hulls: [&mut **left, &mut **right],
-            branches: &mut self.branches,
-            controls: &mut *self.controls,
-            outcome: &mut self.outcome,
-        }
-    }
-}
-
 /// The host's ears.
 pub struct Ears {
     decoder: Decoder<'static>,
@@ -532,7 +505,7 @@ impl<C: CameraPair> Bench<C> {
         self.ports.watchdog.hungriest
     }
 
-    /// The device itself, for reports that nobody asked for.
+    /// The device itself: how it stands, and for reports that nobody asked for.
     pub const fn device(&mut self) -> &mut Device<'static> {
         &mut self.device
     }

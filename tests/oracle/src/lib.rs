@@ -10,3 +10,4 @@ pub mod mesh_checker;
 pub mod nurbs;
 pub mod raster;
 pub mod scene;
+pub mod wire;

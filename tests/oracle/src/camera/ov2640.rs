@@ -1,7 +1,7 @@
 //! The sensor OV2640: what its registers, after a reset and whatever was written, make of a scene.
 
 use super::{SIZE, Scene, Time};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 const MS: u64 = 1_000_000;
 const DSP: u8 = 0;
@@ -98,6 +98,8 @@ pub struct Sensor {
     pub deaf: bool,
     /// A bank and an address whose writes are lost.
     pub forgets: Option<(u8, u8)>,
+    /// Banks and addresses that were written.
+    pub written: BTreeSet<(u8, u8)>,
 
     time: Time,
     /// Time of a first frame, ns.
@@ -130,6 +132,7 @@ impl Sensor {
             product: 0x2642,
             deaf: false,
             forgets: None,
+            written: BTreeSet::new(),
             time,
             phase,
             registers: Default::default(),
@@ -207,6 +210,7 @@ impl Sensor {
         let Some(register) = self.registers[usize::from(bank)].get_mut(&address) else {
             panic!("register {address:#04x} of bank {bank} does not exist, or is read only");
         };
+        self.written.insert((bank, address));
         if self.forgets != Some((bank, address)) {
             *register = value;
         }
@@ -296,8 +300,8 @@ impl Sensor {
             }
             [luma, (90 + u % 60) as u8, (140 + v % 60) as u8]
         };
-        // A change is seen in the frame after the next: until then the upper half is an older one.
-        let torn = begin < self.changed + self.period();
+        // A change is seen two frames after it: until then the upper half is an older one.
+        let torn = begin < self.changed + 2 * self.period();
         let mut bytes = Vec::with_capacity(2 * format.width * format.height);
         for v in 0..format.height {
             for u in 0..format.width {
