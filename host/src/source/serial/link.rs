@@ -4,7 +4,7 @@
 //! Frames that were sent twice are handed out once.
 
 use std::io::{self, Read, Write};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
@@ -70,6 +70,7 @@ pub enum LinkError {
 #[derive(Default)]
 struct Shared {
     stop: AtomicBool,
+    bytes: AtomicU64,
     counters: Mutex<Counters>,
     end: Mutex<Option<LinkError>>,
 }
@@ -144,6 +145,12 @@ impl Link {
         *locked(&self.shared.counters)
     }
 
+    /// Bytes that came so far, whatever they are.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.shared.bytes.load(Ordering::Relaxed)
+    }
+
     fn join(&mut self) {
         if let Some(thread) = self.thread.take() {
             // The thread does not panic; if it did, there is no end to be told.
@@ -179,6 +186,7 @@ fn pump(
                 _ => return LinkError::Lost(Some(error)),
             },
         };
+        shared.bytes.fetch_add(count as u64, Ordering::Relaxed);
         if let Some(tap) = tap
             && let Err(error) = locked(tap).bytes(&bytes[..count])
         {

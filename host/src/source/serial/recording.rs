@@ -43,7 +43,7 @@ pub enum RecordingError {
         source: io::Error,
     },
     /// An entry of an unknown kind, or none that can be read.
-    #[error("the recording {} is damaged at byte {at}; what comes before is lost with it, so copy the file again", path.display())]
+    #[error("the recording {} is damaged at byte {at}; copy it again from where it was made", path.display())]
     Damaged {
         /// The file.
         path: PathBuf,

@@ -36,8 +36,11 @@ pub enum SessionError {
     #[error(transparent)]
     Link(#[from] LinkError),
     /// Nobody says hello.
-    #[error("{}", silent(.0))]
-    Silent(Counters),
+    #[error("{}", silent(*.0))]
+    Silent(
+        /// Bytes that came instead.
+        u64,
+    ),
     /// It says hello in another version of the format.
     #[error(transparent)]
     Version(WireError),
@@ -61,11 +64,11 @@ pub enum SessionError {
     Memory(#[from] CapacityError),
 }
 
-fn silent(counters: &Counters) -> String {
-    match counters.rejected_bytes {
+fn silent(bytes: u64) -> String {
+    match bytes {
         0 => "nothing answers; check that the firmware runs, and that the port is the device's".into(),
         bytes => format!(
-            "nothing answers, but {bytes} bytes came that are no frame; check --baud, and that the port is the \
+            "nothing answers, but {bytes} bytes came that are no hello; check --baud, and that the port is the \
              device's"
         ),
     }
@@ -205,7 +208,7 @@ impl Session {
                 }
             }
         }
-        Err(SessionError::Silent(self.link.counters()))
+        Err(SessionError::Silent(self.link.bytes()))
     }
 
     /// Give an order, again if need be, until it is answered.
