@@ -18,8 +18,8 @@ use crate::export::ExportError;
 use crate::export::ply::{self, Points};
 use crate::reconstruct::{Curves, Reconstruction};
 use crate::report::{Run, numbers, pictures};
-use image::RgbImage;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{GrayImage, RgbImage};
 use rayon::prelude::*;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -181,6 +181,13 @@ pub(crate) fn png(picture: &RgbImage) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Up);
     picture.write_with_encoder(encoder).map_err(io::Error::other)?;
+    Ok(bytes)
+}
+
+/// A grey picture as a file.
+pub(crate) fn grey_png(picture: &GrayImage) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    picture.write_with_encoder(PngEncoder::new(&mut bytes)).map_err(io::Error::other)?;
     Ok(bytes)
 }
 

@@ -6,6 +6,7 @@
 //!   host demo                               try it: no camera, no files needed
 //!   host replay left.png right.png --calib calib.yaml
 //!   host replay recordings/ --out models    every pair in a folder
+//!   host listen --calib calib.yaml          models from a camera device
 //!   host render mesh.obj --out pair         a pair of any mesh that you have
 //!   host evaluate model.ply truth.ply       how far a model is from the truth
 //!   host list-devices                       cameras that are plugged in
@@ -18,11 +19,14 @@ pub mod calibrate;
 pub mod capture;
 pub mod completions;
 pub mod demo;
+pub mod device;
 pub mod evaluate;
 pub mod experiments;
 pub mod inspect;
 pub mod list_devices;
+pub mod listen;
 mod batch;
+mod connect;
 mod model;
 pub mod options;
 pub mod render;
@@ -66,6 +70,12 @@ enum Command {
     /// Whether a calibration is right
     #[command(long_about = page(include_str!("calibrate.rs")))]
     Calibrate(calibrate::Args),
+    /// Models from a camera device
+    #[command(long_about = page(include_str!("listen.rs")))]
+    Listen(listen::Args),
+    /// A camera device: who it is, its calibration, its settings, its pictures
+    #[command(long_about = page(include_str!("device.rs")))]
+    Device(device::Args),
     /// A model from a built-in pair, held against the truth
     #[command(long_about = page(include_str!("demo.rs")))]
     Demo(demo::Args),
@@ -98,6 +108,8 @@ impl Cli {
             Command::Capture(args) => capture::run(args),
             Command::ListDevices(args) => told(args.json, list_devices::run(args)),
             Command::Calibrate(args) => told(args.json, calibrate::run(args)),
+            Command::Listen(args) => told(args.json, listen::run(args)),
+            Command::Device(args) => told(args.json, device::run(args)),
             Command::Demo(args) => told(args.json, demo::run(args)),
             Command::Render(args) => render::run(args),
             Command::Evaluate(args) => told(args.json, evaluate::run(args)),

@@ -6,14 +6,18 @@ use std::time::{Duration, Instant};
 use image::GrayImage;
 use nalgebra::Vector3;
 
+use shared::camera::PairModel;
+use shared::wire::Decoder;
+
 use super::Failure;
 use super::table::{Table, count, percent, sides};
 use crate::calibration::StereoCamera;
 use crate::mesh::Mesh;
 use crate::output;
-use crate::reconstruct::{Options, Reconstruction, reconstruct};
+use crate::reconstruct::{Options, Reconstruction, Refusal, describe, reconstruct, reconstruct_shape};
 use crate::report::record::Record;
 use crate::report::{Run, numbers, words};
+use crate::source::serial::inbox::{Inbox, Message, Pair};
 
 /// All that a model comes from.
 pub(super) struct Order<'a> {
@@ -44,9 +48,54 @@ pub(super) fn make(order: Order<'_>) -> Result<Model, Failure> {
     let mut record = if order.pictures { Record::new() } else { Record::figures_only() };
     let reconstruction = reconstruct(left, right, calibration, options, &mut record)?;
     let run = Run { calibration, options, reconstruction: &reconstruction, record: &record, truth };
-    output::write(order.folder, &run)?;
-    let report = serde_json::from_slice(&numbers::json(&run))?;
+    let report = written(order.folder, &run)?;
     Ok(Model { reconstruction, report, time: start.elapsed() })
+}
+
+/// Reconstructs and writes what a device of this calibration would send of the images.
+pub(super) fn make_as_device(
+    [left, right]: [GrayImage; 2],
+    calibration: &StereoCamera,
+    options: &Options,
+    folder: &Path,
+) -> Result<Model, Failure> {
+    let start = Instant::now();
+    let (device, bytes) = describe(left, right, calibration, options)?;
+    let mut inbox = Inbox::new()?;
+    let mut buffer = vec![0; bytes.len()];
+    let mut decoder = Decoder::new(&mut buffer);
+    let pair = bytes.into_iter().find_map(|byte| decoder.push(byte).map(|frame| inbox.read(&frame)));
+    let Some(Message::Pair(pair)) = pair.transpose()? else {
+        return Err("the frame of a pair was lost on its way through memory".into());
+    };
+    let model = receive((&mut inbox, *pair), &device, options, folder)?;
+    Ok(Model { time: start.elapsed(), ..model })
+}
+
+/// Reconstructs and writes what a device has sent; its shape stands in the inbox.
+pub(super) fn receive(
+    (inbox, pair): (&mut Inbox, Pair),
+    model: &PairModel,
+    options: &Options,
+    folder: &Path,
+) -> Result<Model, Failure> {
+    let start = Instant::now();
+    let outcome = pair.result.map_err(Refusal::from)?;
+    let mut record = Record::figures_only();
+    for (k, eye) in record.eyes.iter_mut().enumerate() {
+        (eye.parts.level, eye.parts.area) = (pair.levels[k], outcome.areas[k] as usize);
+    }
+    let reconstruction = reconstruct_shape(&mut inbox.memory(), outcome, model, options, &mut record)?;
+    let calibration = &model.into();
+    let run = Run { calibration, options, reconstruction: &reconstruction, record: &record, truth: None };
+    let report = written(folder, &run)?;
+    Ok(Model { reconstruction, report, time: start.elapsed() })
+}
+
+/// Writes all files of a run; returns its report.
+fn written(folder: &Path, run: &Run<'_>) -> Result<serde_json::Value, Failure> {
+    output::write(folder, run)?;
+    Ok(serde_json::from_slice(&numbers::json(run))?)
 }
 
 impl Model {

@@ -46,12 +46,20 @@ pub struct MethodArgs {
     /// All that the pictures have, or what a small device makes of them [default: full]
     #[arg(long, value_enum, hide_possible_values = true, value_name = "full|device")]
     profile: Option<Profile>,
-    /// Balls at every contour point, or along the curves of the skeleton [default: full]
-    #[arg(long, value_enum, hide_possible_values = true, value_name = "full|nurbs")]
-    skeleton: Option<Skeleton>,
     /// Prune the skeleton to so many branches, instead of by what stands out
     #[arg(long, value_name = "N")]
     branches: Option<u16>,
+    #[command(flatten)]
+    grow: GrowArgs,
+}
+
+/// How the solid is grown.
+#[derive(Clone, Debug, clap::Args)]
+#[command(next_help_heading = "Method")]
+pub struct GrowArgs {
+    /// Balls at every contour point, or along the curves of the skeleton [default: full, of a device nurbs]
+    #[arg(long, value_enum, hide_possible_values = true, value_name = "full|nurbs")]
+    skeleton: Option<Skeleton>,
     /// How far a ball reaches: to the nearest viewing ray of the outline, to the nearest point of the boundary
     /// in space, or as the distance transform of its view says [default: rays]
     #[arg(long, value_enum, hide_possible_values = true, value_name = "rays|boundary|transform")]
@@ -71,6 +79,27 @@ enum Mode {
 }
 
 impl MethodArgs {
+    /// The choices for a device's shape, in the terms of [`crate::reconstruct`].
+    ///
+    /// # Errors
+    ///
+    /// A [`clap::Error`] if one of them is none that a device has.
+    pub fn device_options(&self) -> Result<Options, Failure> {
+        let chosen = self.options()?;
+        if self.mode == Mode::Paper || self.thinning.is_some() || self.branches.is_some() {
+            return Err(usage(
+                "--mode paper, --thinning and --branches are nothing that a device can be told",
+            ));
+        }
+        let device = self.grow.device_options();
+        Ok(Options {
+            profile: self.profile.unwrap_or(device.profile),
+            threshold: chosen.threshold,
+            polarity: chosen.polarity,
+            ..device
+        })
+    }
+
     /// The choices in the terms of [`crate::reconstruct`].
     ///
     /// # Errors
@@ -82,7 +111,8 @@ impl MethodArgs {
             (Mode::Paper, omega) => reconstruct::Mode::Paper { omega: usize::from(omega.unwrap_or(3)) },
             (Mode::Default, Some(_)) => return Err(usage("--omega belongs to --mode paper")),
         };
-        let chosen = self.skeleton.is_some() || self.radius.is_some() || self.surface.is_some();
+        let grow = &self.grow;
+        let chosen = grow.skeleton.is_some() || grow.radius.is_some() || grow.surface.is_some();
         if chosen && self.mode == Mode::Paper {
             return Err(usage(
                 "--skeleton, --radius and --surface belong to --mode default; the paper has its own",
@@ -92,15 +122,30 @@ impl MethodArgs {
             mode,
             thinning: self.thinning,
             profile: self.profile.unwrap_or_default(),
-            skeleton: self.skeleton.unwrap_or_default(),
+            skeleton: grow.skeleton.unwrap_or_default(),
             branches: self.branches,
-            radius: self.radius.unwrap_or_default(),
-            pieces: self.surface.unwrap_or_default(),
+            radius: grow.radius.unwrap_or_default(),
+            pieces: grow.surface.unwrap_or_default(),
             threshold: self.threshold,
             polarity: self.polarity,
-            cell: self.resolution,
+            cell: grow.resolution,
             scene: Known::default(),
         })
+    }
+}
+
+impl GrowArgs {
+    /// The choices for what a device sends, in the terms of [`crate::reconstruct`].
+    #[must_use]
+    pub fn device_options(&self) -> Options {
+        let device = Options::device();
+        Options {
+            skeleton: self.skeleton.unwrap_or(device.skeleton),
+            radius: self.radius.unwrap_or_default(),
+            pieces: self.surface.unwrap_or_default(),
+            cell: self.resolution,
+            ..device
+        }
     }
 }
 

@@ -15,6 +15,11 @@
 //! boundary.ply, report.json and pictures of every stage. What does not give a trustworthy model is
 //! refused with the reason, and leaves no files; the other pairs go on.
 //!
+//! --as-device makes of pictures what a camera device would make of them and send (`host listen`).
+//!
+//! INPUT may also be a recording of a camera device (`host listen --record`), which gives the models that it
+//! gave live; it holds its calibration.
+//!
 //! Examples:
 //!   host replay left.png right.png --calib calib.yaml
 //!   host replay left.png right.png --focal 750 --baseline 60
@@ -33,10 +38,11 @@ use serde_json::json;
 use super::model::{self, Model, Order};
 use super::options::{CameraArgs, MethodArgs, SceneArgs};
 use super::table::Table;
-use super::{Failure, batch, note, say, say_json, told, words_of};
+use super::{Failure, batch, listen, note, say, say_json, told, words_of};
 use crate::reconstruct::Options;
 use crate::source::find::{Found, find};
 use crate::source::scene::Scene;
+use crate::source::serial::recording::is_recording;
 use crate::source::{Files, Layout, Pair, Views};
 
 /// Arguments of `replay`.
@@ -51,6 +57,10 @@ pub struct Args {
     /// Exchange left and right
     #[arg(long)]
     swap: bool,
+    /// Go the way of a camera device: its rectification, its steps, what its link carries; --skeleton is nurbs
+    /// and --profile device then, unless given
+    #[arg(long)]
+    as_device: bool,
     #[command(flatten)]
     cameras: CameraArgs,
     #[command(flatten)]
@@ -91,7 +101,13 @@ struct Success {
 ///
 /// If there is no pair, or any is refused.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let mut options = args.method.options()?;
+    let mut options = if args.as_device { args.method.device_options() } else { args.method.options() }?;
+    if let [input] = args.input.as_slice()
+        && is_recording(Path::new(input))
+    {
+        let options = args.method.device_options()?;
+        return told(args.json, listen::replay(Path::new(input), &options, &args.out, args.json));
+    }
     let one_file = args.layout.filter(|layout| *layout != Layout::Two);
     let mut scene = told(args.json, args.scene.scene(one_file, args.swap, &mut options))?;
     let mut found = told(args.json, pairs(args))?;
@@ -176,6 +192,9 @@ fn one(
     let make = || {
         let (calibration, beside) = args.cameras.of(pair, &images[0])?;
         let (images, calibration) = scene.apply(images, &calibration)?;
+        if args.as_device {
+            return Ok((model::make_as_device(images, &calibration, options, folder)?, beside));
+        }
         let pictures = !args.no_pictures;
         let order = Order { images, calibration: &calibration, options, pictures, truth: None, folder };
         Ok((model::make(order)?, beside))

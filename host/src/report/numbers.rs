@@ -1,7 +1,7 @@
 //! `report.json`: every figure of a run.
 //!
 //! Field names are stable within a `format_version` and carry their unit (`_px`, `_mm`, `_ms`; `_px2` is an
-//! area in pixels, `_share` a part of one); what a mode does not have is `null`. Pixels are those of the
+//! area in pixels, `_share` a part of one); what a mode does not have, or a device does not send, is `null`. Pixels are those of the
 //! rectified images. All but `times_ms` is the same for every run on the same input.
 
 mod choices;
@@ -141,8 +141,9 @@ impl Times {
             right: serde_json::Map::new(),
             pair: serde_json::Map::new(),
         };
-        // The record's clock runs since before the images were rectified.
-        let mut before = host.first().map_or(Duration::ZERO, |(_, rectify)| *rectify);
+        // The record's clock runs since before the images were rectified, if they were.
+        let rectify = host.iter().find(|(stage, _)| *stage == "rectify");
+        let mut before = rectify.map_or(Duration::ZERO, |(_, time)| *time);
         for lap in &run.record.laps {
             let list = match lap.side {
                 Some(shared::pipeline::Side::Left) => &mut times.left,

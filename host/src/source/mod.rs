@@ -10,6 +10,7 @@ pub mod picture;
 pub mod recording;
 pub mod scene;
 pub mod v4l;
+pub mod serial;
 
 use std::path::{Path, PathBuf};
 

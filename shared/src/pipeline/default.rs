@@ -11,7 +11,7 @@ use crate::point::PixelPoint;
 use crate::stage::branch::{Balls, trace_branch};
 use crate::stage::contour::{ContourPoint, frontier};
 use crate::stage::correspond::match_cuts;
-use crate::stage::depth::ball_depths;
+use crate::stage::depth::{Optics, ball_depths};
 use crate::stage::hull::{RowExtent, convex_hull};
 use crate::stage::medial::medial_balls;
 use crate::stage::plane::{ImagePlane, Observation};
@@ -63,9 +63,8 @@ pub(super) fn match_views(
         gates.meet(Finding::Unmatched(share))?;
     }
 
-    medial_balls(left.contour, memory.balls)?;
-    ball_depths(memory.balls, left.contour, memory.matches, settings.optics, memory.depths)?;
-    observer.saw(None, Product::Balls(memory.balls, memory.depths));
+    lift_balls(memory, settings.optics, observer)?;
+    let [left, _] = &mut memory.eyes;
     left.samples.clear();
     left.branches.clear();
     let balls = Balls { balls: memory.balls, depths: memory.depths };
@@ -74,8 +73,21 @@ pub(super) fn match_views(
         trace_branch(path, free, balls, left.samples)?;
         add_branch(left.branches, left.samples, start, nodes, closed)
     })?;
-    fit_curves(left, scratch, &settings.curves)?;
+    fit_curves(left, Arena::new(memory.scratch), &settings.curves)?;
     observer.saw(None, Product::Curves(left.branches, left.controls));
+    Ok(())
+}
+
+/// The left view's medial balls and their depths.
+pub(super) fn lift_balls(
+    memory: &mut Memory<'_>,
+    optics: Optics,
+    observer: &mut impl Observer,
+) -> Result<(), CapacityError> {
+    let contour = &*memory.eyes[0].contour;
+    medial_balls(contour, memory.balls)?;
+    ball_depths(memory.balls, contour, memory.matches, optics, memory.depths)?;
+    observer.saw(None, Product::Balls(memory.balls, memory.depths));
     Ok(())
 }
 

@@ -238,7 +238,7 @@ pub(super) fn fit_curves(
 }
 
 /// Replace the samples by points of the fitted curves, a pixel apart.
-fn follow_curves(eye: &mut EyeMemory<'_>) -> Result<(), CapacityError> {
+pub(super) fn follow_curves(eye: &mut EyeMemory<'_>) -> Result<(), CapacityError> {
     eye.samples.clear();
     for branch in eye.branches.iter_mut() {
         branch.samples = eye.samples.len();

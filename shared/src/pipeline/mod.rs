@@ -20,12 +20,14 @@ mod finding;
 mod memory;
 mod observer;
 mod paper;
+mod resume;
 
 pub use eye::object_box;
 pub use finding::{Finding, MAX_COVER};
 pub use memory::{Branch, EyeMemory, Memory, outline_words, scratch_words};
 pub use observer::{Observer, Product};
 pub use paper::PAPER_VERTICES;
+pub use resume::resume;
 
 use crate::arena::Arena;
 use crate::bitmap::{Grey, Size};

@@ -120,6 +120,22 @@ pub struct ShapeLists<'a> {
     pub outcome: &'a mut Outcome,
 }
 
+impl<'a> ShapeLists<'a> {
+    /// The memory of a run, to be taken up with [`resume`](crate::pipeline::resume).
+    pub fn of(memory: &'a mut Memory<'_>, outcome: &'a mut Outcome) -> Self {
+        let [left, right] = &mut memory.eyes;
+        Self {
+            contour: left.contour,
+            loops: left.loops,
+            matches: memory.matches,
+            hulls: [left.hull, right.hull],
+            branches: left.branches,
+            controls: left.controls,
+            outcome,
+        }
+    }
+}
+
 impl ShapeLists<'_> {
     /// What the lists hold.
     pub fn shape(&self) -> Shape<'_> {

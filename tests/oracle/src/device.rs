@@ -386,11 +386,16 @@ impl<C: CameraPair> Bench<C> {
 
     /// Let the device do one thing, and the host hear what it says.
     pub fn step(&mut self) -> Pace {
-        let pace = step(&mut self.device, &mut self.ports);
-        self.time.delay_us(if pace == Pace::Idle { 1000 } else { 20 });
-        let bytes: Vec<u8> = self.cable.borrow_mut().to_host.drain(..).collect();
+        let (pace, bytes) = self.carry();
         self.heard.extend(self.ears.hear(bytes));
         pace
+    }
+
+    /// Let the device do one thing; the bytes that it sends meanwhile.
+    pub fn carry(&mut self) -> (Pace, Vec<u8>) {
+        let pace = step(&mut self.device, &mut self.ports);
+        self.time.delay_us(if pace == Pace::Idle { 1000 } else { 20 });
+        (pace, self.cable.borrow_mut().to_host.drain(..).collect())
     }
 
     /// Let so many steps pass; what was heard meanwhile.

@@ -21,9 +21,10 @@ pub(super) struct Choices {
     /// By how much triangles of matched vertices may differ in area, in paper mode.
     triangle_threshold_share: Option<f64>,
     median_filter: bool,
-    /// `otsu` or `fixed`.
-    threshold: &'static str,
-    polarity: &'static str,
+    /// `otsu` or `fixed`; a device's is its own.
+    threshold: Option<&'static str>,
+    /// A device's is its own.
+    polarity: Option<&'static str>,
     thinning: &'static str,
     /// `none`, `protrusion`, `length` or `branches`.
     pruning: &'static str,
@@ -55,6 +56,7 @@ impl Choices {
             Mode::Default => ("default", None),
             Mode::Paper { omega } => ("paper", Some(omega)),
         };
+        let seen = run.record.eyes.iter().any(|eye| eye.parts.tone.is_some());
         let share = |x: i32| f64::from(x) / f64::from(ONE);
         let (pruning, pruning_px, pruning_branches) = match chosen.pruning {
             Pruning::None => ("none", None, None),
@@ -70,11 +72,11 @@ impl Choices {
                 Method::Paper(paper) => Some(share(paper.threshold)),
             },
             median_filter: chosen.median,
-            threshold: match chosen.threshold {
+            threshold: seen.then_some(match chosen.threshold {
                 Threshold::Otsu => "otsu",
                 Threshold::Fixed(_) => "fixed",
-            },
-            polarity: words::polarity_name(chosen.polarity),
+            }),
+            polarity: seen.then(|| words::polarity_name(chosen.polarity)),
             thinning: words::rule_name(chosen.thinning),
             pruning,
             pruning_px,

@@ -4,14 +4,14 @@
 //! `shared::stage::warp`, rows in parallel: the same bits as on a microcontroller.
 
 use image::GrayImage;
-use nalgebra::{Matrix3, Rotation3};
+use nalgebra::{Matrix3, Rotation3, Vector3};
 use rayon::prelude::*;
 use shared::bitmap::{Grey, Size};
 use shared::camera::{EyeModel, Lens, Mapping, PairModel};
 use shared::stage::warp::{Warp, knots};
 
 use super::{Rectification, RectifiedCamera, RectifyError, Turned};
-use crate::calibration::Distortion;
+use crate::calibration::{Camera, Distortion, StereoCamera};
 
 impl Rectification {
     /// What a device has to know to make the same rectified pair. The images of [`Self::same_size`] are as
@@ -60,6 +60,41 @@ impl From<&PairModel> for RectifiedCamera {
             cx_right: model.columns[1],
             baseline_mm: model.baseline,
             to_left: Rotation3::from_matrix_unchecked(Matrix3::from(model.to_left).transpose()),
+        }
+    }
+}
+
+impl From<&PairModel> for StereoCamera {
+    /// The raw pair of a device's model, whose images are as large as the rectified ones.
+    fn from(model: &PairModel) -> Self {
+        let (width, height) = (model.width.into(), model.height.into());
+        let Some([left, right]) = &model.eyes else {
+            let mut pair = Self::rectified(width, height, model.focal, model.baseline);
+            for (camera, column) in [(&mut pair.left, model.columns[0]), (&mut pair.right, model.columns[1])]
+            {
+                (camera.cx, camera.cy) = (column, model.row);
+            }
+            return pair;
+        };
+        let camera = |eye: &EyeModel| Camera {
+            width,
+            height,
+            fx: eye.focal[0],
+            fy: eye.focal[1],
+            cx: eye.centre[0],
+            cy: eye.centre[1],
+            skew: eye.skew,
+            distortion: match eye.lens {
+                Lens::Polynomial(k) => Distortion::Polynomial(k),
+                Lens::Equidistant(k) => Distortion::Equidistant(k),
+            },
+        };
+        let turn = |eye: &EyeModel| Matrix3::from(eye.turn).transpose();
+        Self {
+            left: camera(left),
+            right: camera(right),
+            rotation: turn(right) * turn(left).transpose(),
+            translation: turn(right) * Vector3::new(-model.baseline, 0.0, 0.0),
         }
     }
 }

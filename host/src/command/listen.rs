@@ -1,0 +1,313 @@
+//! Models from a camera device, as it describes one pair after the other.
+//!
+//! The device finds the object in its pictures, matches the views and sends a description of some kilobytes; this
+//! end grows the solid from it. What the pictures mean is the calibration that the device keeps; the same file
+//! must be given here (`host device calibrate` uploads it, and check sums tell one from another).
+//!
+//! Each pair leaves a folder of its own in --out, numbered as they come, as `host replay` does; what does not
+//! give a trustworthy model is refused with the reason, and the others go on. A device that is unplugged or
+//! starts anew is waited for. It goes on until --frames pairs have come, --seconds have passed, or Ctrl-C.
+//!
+//! --record keeps what came, byte for byte; `host replay FILE` makes the same models of it again.
+//!
+//! With --json, every pair is a line of JSON when it is done, and the last line is about the link.
+//!
+//! Examples:
+//!   host listen --calib calib.yaml
+//!   host listen --port /dev/ttyACM0 --calib calib.yaml --frames 10 --out models
+//!   host listen --port unix:/tmp/camera --calib calib.yaml --record cup.link --json
+
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use indicatif::ProgressBar;
+use serde_json::{Value, json};
+use shared::camera::PairModel;
+use shared::stage::binarise::{Polarity, Threshold};
+use shared::wire::{Decoder, MAX_FRAME, ToDevice};
+
+use super::connect::{
+    PortArgs, check_calibration, hello_as_json, link_as_json, link_in_words, model_of, progress, version,
+};
+use super::model::{self, Model};
+use super::options::GrowArgs;
+use super::table::{count, sides};
+use super::{Failure, note, say, words_of};
+use crate::reconstruct::Options;
+use crate::report::words::{parse_polarity, parse_threshold};
+use crate::source::serial::inbox::{Hello, Inbox, Message, Pair};
+use crate::source::serial::link::frames;
+use crate::source::serial::recording::{Recording, Writer};
+use crate::source::serial::session::{Session, Tally};
+
+/// Longest that is waited for a frame before time is looked at.
+const LOOK: Duration = Duration::from_millis(250);
+
+/// Arguments of `listen`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    port: PortArgs,
+    /// Calibration that the device keeps: OpenCV (M1 D1 M2 D2 R T), ROS or Kalibr
+    #[arg(long, value_name = "FILE")]
+    calib: PathBuf,
+    /// Have the device part object and background here, instead of as it was told before
+    #[arg(long, value_parser = parse_threshold, value_name = "otsu|N")]
+    threshold: Option<Threshold>,
+    /// Have the device look for a brighter or a darker object, instead of as it was told before
+    #[arg(long, value_parser = parse_polarity, value_name = "bright|dark|auto")]
+    polarity: Option<Polarity>,
+    #[command(flatten)]
+    grow: GrowArgs,
+    /// Stop after so many pairs
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    frames: Option<u32>,
+    /// Stop after so many seconds
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    seconds: Option<u32>,
+    /// Keep what comes in a new file
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
+    /// Folder for the results
+    #[arg(long, value_name = "DIR", default_value = "ossature-out")]
+    out: PathBuf,
+    /// Print lines of JSON instead of text
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
+/// Listens.
+///
+/// # Errors
+///
+/// If there is no device, its calibration is another, or no pair gives a model.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let model = model_of(&args.calib)?;
+    let options = args.grow.device_options();
+    let mut desk = Desk::new((&model, &options), &args.out, args.json);
+    let end = args.seconds.map(|seconds| Instant::now() + Duration::from_secs(seconds.into()));
+    let recording = args.record.as_ref().map(|path| Writer::begin(path, &model)).transpose()?;
+    let tap = recording.map(|writer| Arc::new(Mutex::new(writer)));
+    let (mut session, hello) = args.port.begin(tap)?;
+    desk.greeted(&hello)?;
+    let heard = listen(args, &mut session, &mut desk, end);
+    // The device may be gone; it stops by itself when it starts anew.
+    let stopped = heard.as_ref().map_or(Ok(()), |()| session.order(&ToDevice::Stop));
+    if stopped.is_err() {
+        desk.remark("the device was not there any more to be told to stop");
+    }
+    heard?;
+    desk.close(&session.tally())
+}
+
+fn listen(
+    args: &Args,
+    session: &mut Session,
+    desk: &mut Desk<'_>,
+    end: Option<Instant>,
+) -> Result<(), Failure> {
+    start(args, session)?;
+    while args.frames.is_none_or(|frames| desk.pairs < frames) && end.is_none_or(|end| Instant::now() < end) {
+        match session.receive(LOOK) {
+            Ok(Some((message, first))) => {
+                if first && matches!(message, Message::Hello(_)) {
+                    desk.remark("the device has started anew");
+                    start(args, session)?;
+                }
+                desk.take(session.inbox(), message)?;
+            }
+            Ok(None) => {}
+            Err(error) if error.is_loss() => {
+                desk.remark(&format!("{}; waiting for the device", words_of(&error)));
+                let Some(hello) = session.resume(end)? else { break };
+                desk.greeted(&hello)?;
+                start(args, session)?;
+            }
+            Err(error) => return Err(error.into()),
+        }
+        desk.show(&session.tally());
+    }
+    Ok(())
+}
+
+/// Have a device that was greeted begin.
+fn start(args: &Args, session: &mut Session) -> Result<(), Failure> {
+    if let Some(threshold) = args.threshold {
+        session.order(&ToDevice::Threshold(threshold))?;
+    }
+    if let Some(polarity) = args.polarity {
+        session.order(&ToDevice::Polarity(polarity))?;
+    }
+    Ok(session.order_cameras(&ToDevice::Start)?)
+}
+
+/// Makes the models of a recording again.
+///
+/// # Errors
+///
+/// If the recording cannot be read, or no pair gives a model.
+pub(super) fn replay(path: &Path, options: &Options, out: &Path, json: bool) -> Result<(), Failure> {
+    let recording = Recording::read(path)?;
+    let mut desk = Desk::new((&recording.calibration, options), out, json);
+    let (mut inbox, mut tally) = (Inbox::new()?, Tally::default());
+    for (k, bytes) in recording.connections.iter().enumerate() {
+        let mut buffer = vec![0; MAX_FRAME];
+        let mut decoder = Decoder::new(&mut buffer);
+        let mut arrived = Vec::new();
+        frames(&mut decoder, bytes, |frame| arrived.push(frame));
+        let mut greeted = false;
+        for frame in arrived {
+            match inbox.read(&frame.frame()) {
+                // What a device said before it was greeted is of another time.
+                Ok(Message::Hello(hello)) if !greeted => {
+                    greeted = true;
+                    desk.greeted(&hello)?;
+                }
+                Ok(message) if greeted => desk.take(&mut inbox, message)?,
+                Ok(_) => {}
+                Err(_) => tally.unreadable = tally.unreadable.saturating_add(1),
+            }
+        }
+        tally.add(decoder.counters());
+        tally.reconnections = u32::try_from(k).unwrap_or(u32::MAX);
+    }
+    desk.close(&tally)
+}
+
+/// Where messages become models and words.
+struct Desk<'a> {
+    model: &'a PairModel,
+    options: &'a Options,
+    out: &'a Path,
+    json: bool,
+    bar: ProgressBar,
+    start: Instant,
+    pairs: u32,
+    models: u32,
+}
+
+impl<'a> Desk<'a> {
+    fn new((model, options): (&'a PairModel, &'a Options), out: &'a Path, json: bool) -> Self {
+        let (bar, start) = (progress(), Instant::now());
+        Self { model, options, out, json, bar, start, pairs: 0, models: 0 }
+    }
+
+    /// A line to standard error.
+    fn remark(&self, line: &str) {
+        self.bar.suspend(|| note(line));
+    }
+
+    /// A line to standard output.
+    fn line(&self, json: impl FnOnce() -> Value, text: impl FnOnce() -> String) -> Result<(), Failure> {
+        let line = if self.json { json().to_string() } else { text() };
+        self.bar.suspend(|| say(&format!("{line}\n")))
+    }
+
+    fn greeted(&mut self, hello: &Hello) -> Result<(), Failure> {
+        check_calibration(self.model, hello)?;
+        self.line(
+            || json!({ "device": hello_as_json(hello) }),
+            || {
+                format!(
+                    "{}, firmware {}, {}x{} px",
+                    hello.board,
+                    version(hello),
+                    hello.picture[0],
+                    hello.picture[1]
+                )
+            },
+        )
+    }
+
+    fn take(&mut self, inbox: &mut Inbox, message: Message) -> Result<(), Failure> {
+        let Message::Pair(pair) = message else { return Ok(()) };
+        self.pairs += 1;
+        let folder = self.out.join(format!("{:06}", self.pairs));
+        let told = heading(&pair);
+        match model::receive((inbox, *pair), self.model, self.options, &folder) {
+            Ok(model) => {
+                self.models += 1;
+                let warnings = model.warnings();
+                self.line(
+                    || {
+                        let (mut told, more) = (
+                            told.clone(),
+                            json!({ "folder": folder, "warnings": warnings, "report": model.report }),
+                        );
+                        merge(&mut told, more);
+                        told
+                    },
+                    || described(&told, &model, &warnings, &folder),
+                )
+            }
+            Err(failure) => {
+                let sentence = words_of(&*failure);
+                self.line(
+                    || {
+                        let mut told = told.clone();
+                        merge(&mut told, json!({ "error": sentence }));
+                        told
+                    },
+                    || format!("pair {}: refused: {sentence}", told["pair"]),
+                )
+            }
+        }
+    }
+
+    /// How it goes, on a terminal.
+    fn show(&self, tally: &Tally) {
+        let rate = f64::from(self.pairs) / self.start.elapsed().as_secs_f64().max(1e-3);
+        let link = link_in_words(tally).map_or_else(String::new, |words| format!("; {words}"));
+        let (models, pairs) = (self.models, self.pairs);
+        self.bar.set_message(format!("{models} models of {pairs} pairs, {rate:.2} a second{link}"));
+    }
+
+    fn close(self, tally: &Tally) -> Result<(), Failure> {
+        self.bar.finish_and_clear();
+        let (models, pairs) = (self.models, self.pairs);
+        self.line(
+            || json!({ "pairs": pairs, "models": models, "link": link_as_json(tally) }),
+            || {
+                let link = link_in_words(tally).map_or_else(String::new, |words| format!("; {words}"));
+                format!("{models} of {} have a model{link}", count(pairs as usize, "pair", "pairs"))
+            },
+        )?;
+        match (pairs, models) {
+            (0, _) => Err("no pair came; look at the device's cameras (`host device info`)".into()),
+            (_, 0) => Err("no pair gave a model".into()),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// What a device says of a pair beside its shape.
+fn heading(pair: &Pair) -> Value {
+    let exposure = |k: usize| {
+        let exposure = pair.exposures[k];
+        json!({ "lines": exposure.lines, "gain": f64::from(exposure.gain) / 256.0 })
+    };
+    json!({
+        "pair": pair.number,
+        "stamps_us": pair.stamps,
+        "gap_us": pair.stamps[1].wrapping_sub(pair.stamps[0]).cast_signed(),
+        "levels_grey": pair.levels,
+        "exposures": [exposure(0), exposure(1)],
+    })
+}
+
+/// Adds the fields of one object to another.
+fn merge(into: &mut Value, from: Value) {
+    if let (Some(into), Value::Object(from)) = (into.as_object_mut(), from) {
+        into.extend(from);
+    }
+}
+
+fn described(told: &Value, model: &Model, warnings: &[String], folder: &Path) -> String {
+    let (pair, size, folder) = (&told["pair"], sides(model.size()), folder.display());
+    let mut text = format!("pair {pair}: {size}: {folder}");
+    for warning in warnings {
+        text.push_str(&format!("\n  warning: {warning}"));
+    }
+    text
+}

@@ -1,0 +1,178 @@
+//! Recordings: what came over a link, byte for byte, with the times at which it came.
+//!
+//! ```text
+//! "ossature-link-1\n", then entries: kind u8 | time us u64 | length u32 | bytes
+//! kinds: 0 a connection begins, 1 bytes of the device, 2 the calibration as the frame of an upload
+//! ```
+//!
+//! Numbers are little-endian. Entries are appended, and handed to the system whenever a frame ends, so a
+//! recording that was cut off is a shorter recording.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Read, Write};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use shared::camera::PairModel;
+use shared::wire::{Decoder, ToDevice};
+
+use super::link::MAX_COMMAND;
+
+const MAGIC: &[u8] = b"ossature-link-1\n";
+const CONNECTION: u8 = 0;
+const BYTES: u8 = 1;
+const CALIBRATION: u8 = 2;
+/// Kind, time and length.
+const HEAD: usize = 13;
+
+/// Why there is no recording.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordingError {
+    /// A file of that name is there.
+    #[error("{} exists already; name a new file for the recording", path.display())]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// It cannot be written or read.
+    #[error("the recording {} cannot be used", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// An entry of an unknown kind, or none that can be read.
+    #[error("the recording {} is damaged at byte {at}; copy it again from where it was made", path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// Where.
+        at: usize,
+    },
+    /// A file without a calibration.
+    #[error("the recording {} ends before its calibration", path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+/// A recording under way.
+#[derive(Debug)]
+pub struct Writer {
+    path: PathBuf,
+    file: BufWriter<File>,
+    start: Instant,
+}
+
+impl Writer {
+    /// Begin a recording in a new file.
+    ///
+    /// # Errors
+    /// When the file exists or cannot be written.
+    pub fn begin(path: &Path, calibration: &PairModel) -> Result<Self, RecordingError> {
+        let file = File::create_new(path).map_err(|source| match source.kind() {
+            io::ErrorKind::AlreadyExists => RecordingError::Exists { path: path.into() },
+            _ => RecordingError::Io { path: path.into(), source },
+        })?;
+        let mut writer = Self { path: path.into(), file: BufWriter::new(file), start: Instant::now() };
+        let mut frame = [0; MAX_COMMAND];
+        let length = ToDevice::Calibration(*calibration).encode(0, &mut frame);
+        let length = length.map_err(|error| writer.failed(io::Error::other(error)))?;
+        writer.file.write_all(MAGIC).map_err(|source| writer.failed(source))?;
+        writer.append(CALIBRATION, &frame[..length])?;
+        Ok(writer)
+    }
+
+    /// A connection begins.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn connection(&mut self) -> Result<(), RecordingError> {
+        self.append(CONNECTION, &[])
+    }
+
+    /// Bytes came.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn bytes(&mut self, bytes: &[u8]) -> Result<(), RecordingError> {
+        self.append(BYTES, bytes)
+    }
+
+    fn append(&mut self, kind: u8, bytes: &[u8]) -> Result<(), RecordingError> {
+        let time = self.start.elapsed().as_micros() as u64;
+        let mut entry = vec![kind];
+        entry.extend(time.to_le_bytes());
+        entry.extend((bytes.len() as u32).to_le_bytes());
+        entry.extend(bytes);
+        let written = self.file.write_all(&entry);
+        // A frame ends with a zero.
+        let ends = kind != BYTES || bytes.contains(&0);
+        let done = written.and_then(|()| if ends { self.file.flush() } else { Ok(()) });
+        done.map_err(|source| self.failed(source))
+    }
+
+    fn failed(&self, source: io::Error) -> RecordingError {
+        RecordingError::Io { path: self.path.clone(), source }
+    }
+}
+
+/// A recording that was read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recording {
+    /// What the device's pixels mean.
+    pub calibration: PairModel,
+    /// What came, connection by connection.
+    pub connections: Vec<Vec<u8>>,
+    /// Time from its beginning to its last entry, us.
+    pub length: u64,
+}
+
+/// Whether a file is a recording, as far as its first bytes say.
+#[must_use]
+pub fn is_recording(path: &Path) -> bool {
+    let mut head = [0; MAGIC.len()];
+    let read = File::open(path).and_then(|mut file| file.read_exact(&mut head));
+    path.is_file() && read.is_ok() && head == MAGIC
+}
+
+impl Recording {
+    /// Read a recording. Of one that was cut off, the last entry that is not whole is left out.
+    ///
+    /// # Errors
+    /// When it cannot be read, or is none.
+    pub fn read(path: &Path) -> Result<Self, RecordingError> {
+        let file = std::fs::read(path).map_err(|source| RecordingError::Io { path: path.into(), source })?;
+        let damaged =
+            |rest: &[u8]| RecordingError::Damaged { path: path.into(), at: file.len() - rest.len() };
+        let mut rest = file.strip_prefix(MAGIC).ok_or_else(|| damaged(&file))?;
+        let (mut calibration, mut connections, mut length) = (None, Vec::new(), 0);
+        while let Some((head, after)) = rest.split_first_chunk::<HEAD>() {
+            let [kind, t0, t1, t2, t3, t4, t5, t6, t7, l0, l1, l2, l3] = *head;
+            let count = u32::from_le_bytes([l0, l1, l2, l3]) as usize;
+            let Some((bytes, after)) = after.split_at_checked(count) else { break };
+            match kind {
+                CONNECTION => connections.push(Vec::new()),
+                BYTES => connections.last_mut().ok_or_else(|| damaged(rest))?.extend_from_slice(bytes),
+                CALIBRATION => calibration = Some(uploaded(bytes).ok_or_else(|| damaged(rest))?),
+                _ => return Err(damaged(rest)),
+            }
+            length = u64::from_le_bytes([t0, t1, t2, t3, t4, t5, t6, t7]);
+            rest = after;
+        }
+        let calibration = calibration.ok_or_else(|| RecordingError::Empty { path: path.into() })?;
+        Ok(Self { calibration, connections, length })
+    }
+}
+
+/// The calibration in the frame of an upload.
+fn uploaded(frame: &[u8]) -> Option<PairModel> {
+    let mut buffer = [0; MAX_COMMAND];
+    let mut decoder = Decoder::new(&mut buffer);
+    frame.iter().find_map(|byte| match ToDevice::decode(&decoder.push(*byte)?) {
+        Ok(ToDevice::Calibration(model)) => Some(model),
+        _ => None,
+    })
+}

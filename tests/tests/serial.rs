@@ -1,0 +1,337 @@
+//! The host's end of a link, with the boards' own loop at the other: over sockets and a pseudo-terminal, through
+//! damage and loss, what comes out is what the pictures give, or nothing.
+#![cfg(unix)]
+
+use clap::Parser;
+use host::calibration::{Distortion, StereoCamera};
+use host::command::{Cli, words_of};
+use host::shape::Shape;
+use host::source::serial::link::frames;
+use host::source::serial::port::{Address, Port};
+use host::source::serial::recording::Recording;
+use nalgebra::Rotation3;
+use oracle::camera::Time;
+use oracle::device::{Bench, Eyes, Page};
+use oracle::link;
+use oracle::scene::{Pair, camera, pair};
+use shared::wire::{Counters, Decoder, MAX_FRAME};
+use std::cell::RefCell;
+use std::fs;
+use std::io::{ErrorKind, Read, Write};
+use std::os::unix::net::UnixListener;
+use std::path::Path;
+use std::rc::Rc;
+use std::thread;
+use std::time::Duration;
+use tempfile::TempDir;
+
+const SHAPE: Shape = Shape::Screwdriver;
+
+/// A folder with a calibration whose cameras bend and turn a little, and the raw pictures of a device.
+fn scene() -> (TempDir, Pair) {
+    let folder = TempDir::new().unwrap();
+    let bent = camera(2);
+    let mut lens = [0.0; 12];
+    lens[0] = -0.02;
+    let lens = Distortion::Polynomial(lens);
+    let turn = Rotation3::from_euler_angles(0.0, 0.004, 0.0);
+    let calibration = StereoCamera {
+        left: host::calibration::Camera { distortion: lens, ..bent.left },
+        right: host::calibration::Camera { distortion: lens, ..bent.right },
+        rotation: turn.into_inner(),
+        translation: turn * bent.translation,
+    };
+    calibration.write_opencv_yaml(folder.path().join("calib.yaml")).unwrap();
+    let pictures = pair(SHAPE, 2);
+    for (name, picture) in ["left.png", "right.png"].iter().zip(&pictures) {
+        picture.save(folder.path().join(name)).unwrap();
+    }
+    (folder, pictures)
+}
+
+/// What a link does to bytes on their way to the host; how many went before.
+type Fault = fn(usize, Vec<u8>) -> Vec<u8>;
+
+fn intact(_: usize, bytes: Vec<u8>) -> Vec<u8> {
+    bytes
+}
+
+/// Carry bytes between a device and a port until the port or `limit` bytes end.
+fn carry(bench: &mut Bench<Eyes>, port: &mut Port, fault: Fault, limit: usize) {
+    let (mut sent, mut buffer) = (0, [0; 512]);
+    while sent < limit {
+        match port.reader.read(&mut buffer) {
+            Ok(0) => return,
+            Ok(count) => bench.cable.borrow_mut().to_device.extend(&buffer[..count]),
+            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
+            Err(_) => return,
+        }
+        for _ in 0..50 {
+            let (_, bytes) = bench.carry();
+            let count = bytes.len();
+            if port.writer.write_all(&fault(sent, bytes)).is_err() {
+                return;
+            }
+            sent += count;
+        }
+    }
+}
+
+/// A device in its own thread.
+fn device(scenes: Pair) -> Bench<Eyes> {
+    let time = Time::default();
+    let (eyes, _) = Eyes::new(scenes.map(image::GrayImage::into_raw), time.clone());
+    Bench::new(eyes, time, &Rc::new(RefCell::new(Page::default())))
+}
+
+/// A device behind a socket, which hangs up once after so many bytes of its first connection.
+fn serve(folder: &Path, pictures: &Pair, fault: Fault, hang_up: usize) -> String {
+    let path = folder.join("device.socket");
+    let listener = UnixListener::bind(&path).unwrap();
+    let pictures = pictures.clone();
+    thread::spawn(move || {
+        let (mut bench, mut limit) = (device(pictures), hang_up);
+        for stream in listener.incoming() {
+            let stream = stream.unwrap();
+            stream.set_read_timeout(Some(Duration::from_millis(1))).unwrap();
+            let reader = Box::new(stream.try_clone().unwrap());
+            carry(&mut bench, &mut Port { reader, writer: Box::new(stream) }, fault, limit);
+            limit = usize::MAX;
+        }
+    });
+    path.display().to_string()
+}
+
+/// The program's result, as an exit code and its sentence.
+fn host(args: &[&str]) -> Result<(), String> {
+    let cli = Cli::try_parse_from([&["host"], args].concat()).unwrap_or_else(|error| panic!("{error}"));
+    cli.run().map_err(|failure| words_of(&*failure))
+}
+
+fn within(folder: &Path, name: &str) -> String {
+    folder.join(name).display().to_string()
+}
+
+/// The surface, the skeleton and the boundary of a model.
+fn model(folder: &Path) -> [Vec<u8>; 3] {
+    ["model.ply", "skeleton.ply", "boundary.ply"].map(|name| fs::read(folder.join(name)).unwrap())
+}
+
+/// The report, but for its times.
+fn report(folder: &Path) -> serde_json::Value {
+    let mut report: serde_json::Value =
+        serde_json::from_slice(&fs::read(folder.join("report.json")).unwrap()).unwrap();
+    report["times_ms"].take();
+    report
+}
+
+/// Give the device its calibration and an exposure at which it sees the pictures as they are.
+fn prepare(folder: &Path, port: &str) {
+    host(&["device", "calibrate", &within(folder, "calib.yaml"), "--port", port]).unwrap();
+    host(&["device", "expose", "300,1", "--port", port]).unwrap();
+}
+
+/// Make the model of the pictures, without a device.
+fn direct(folder: &Path) -> [Vec<u8>; 3] {
+    let file = |name: &str| within(folder, name);
+    let (left, right, calib, out) = (file("left.png"), file("right.png"), file("calib.yaml"), file("direct"));
+    host(&["replay", &left, &right, "--calib", &calib, "--as-device", "--out", &out]).unwrap();
+    model(&folder.join("direct"))
+}
+
+/// What was recorded, read again.
+fn counters(recording: &Path) -> Vec<Counters> {
+    let recording = Recording::read(recording).unwrap();
+    let count = |bytes: &Vec<u8>| {
+        let mut buffer = vec![0; MAX_FRAME];
+        let mut decoder = Decoder::new(&mut buffer);
+        frames(&mut decoder, bytes, |_| ());
+        *decoder.counters()
+    };
+    recording.connections.iter().map(count).collect()
+}
+
+#[test]
+fn live_recorded_and_from_pictures_are_the_same_model() {
+    let (folder, pictures) = scene();
+    let folder = folder.path();
+    let file = |name: &str| within(folder, name);
+    let port = &serve(folder, &pictures, intact, usize::MAX);
+    let (calib, live, tape) = (file("calib.yaml"), file("live"), file("tape"));
+    let listen = ["listen", "--port", port, "--calib", &calib, "--frames", "2", "--out", &live];
+
+    let uncalibrated = host(&listen).unwrap_err();
+    assert!(uncalibrated.contains("keeps no calibration"), "{uncalibrated}");
+    prepare(folder, port);
+    host(&["device", "info", "--port", port, "--json"]).unwrap();
+    host(&["device", "threshold", "otsu", "--port", port]).unwrap();
+    host(&["device", "grab", "grey", "--out", &file("grey"), "--port", port]).unwrap();
+    host(&["device", "grab", "mask", "--out", &file("mask"), "--port", port]).unwrap();
+    for (name, picture) in ["left.png", "right.png"].iter().zip(&pictures) {
+        let grabbed = image::open(folder.join("grey").join(name)).unwrap().to_luma8();
+        assert!(grabbed == *picture, "{name} is what the eye sees");
+        let mask = image::open(folder.join("mask").join(name)).unwrap().to_luma8();
+        let lit = mask.pixels().filter(|p| p[0] == 255).count();
+        let bright = picture.pixels().filter(|p| p[0] > 100).count();
+        assert!(lit.abs_diff(bright) * 10 < bright, "{lit} of about {bright} px");
+    }
+
+    host(&[&listen[..], &["--record", &tape]].concat()).unwrap();
+    host(&["replay", &tape, "--out", &file("again")]).unwrap();
+    let truth = direct(folder);
+    for pair in ["000001", "000002"] {
+        let (live, again) = (folder.join("live").join(pair), folder.join("again").join(pair));
+        assert!(model(&live) == truth, "live {pair}");
+        assert!(model(&again) == truth, "recorded {pair}");
+        assert_eq!(report(&live), report(&again));
+        assert_eq!(report(&live), report(&folder.join("direct")));
+    }
+    assert!(host(&[&listen[..], &["--record", &tape]].concat()).unwrap_err().contains("exists already"));
+
+    let other = file("other.yaml");
+    camera(2).write_opencv_yaml(&other).unwrap();
+    let refused = host(&["listen", "--port", port, "--calib", &other, "--out", &live]).unwrap_err();
+    assert!(refused.contains("another calibration"), "{refused}");
+}
+
+/// Bits flip, 300 bytes vanish, a connection begins within a frame and then says nothing of use for long.
+fn bad_cable(sent: usize, bytes: Vec<u8>) -> Vec<u8> {
+    const EVERY: usize = 9001;
+    let mut out = Vec::new();
+    if sent == 0 && !bytes.is_empty() {
+        out.extend([0x55; 3 * MAX_FRAME]);
+        out.push(0);
+    }
+    for (k, byte) in (sent..).zip(bytes) {
+        match k % EVERY {
+            2000..2300 => {}
+            6000 => out.push(byte ^ 0x10),
+            _ => out.push(byte),
+        }
+    }
+    out
+}
+
+#[test]
+fn damage_is_counted_and_never_a_wrong_model() {
+    let (folder, pictures) = scene();
+    let folder = folder.path();
+    let port = &serve(folder, &pictures, bad_cable, 60_000);
+    prepare(folder, port);
+    let (calib, out, tape) = (within(folder, "calib.yaml"), within(folder, "out"), within(folder, "tape"));
+    let args =
+        ["listen", "--port", port, "--calib", &calib, "--frames", "12", "--out", &out, "--record", &tape];
+    host(&args).unwrap();
+    let truth = direct(folder);
+    for pair in 1..=12 {
+        assert!(model(&folder.join(format!("out/{pair:06}"))) == truth, "pair {pair}");
+    }
+    let counted = counters(Path::new(&tape));
+    for counters in &counted {
+        assert_eq!(counters.partial, 1, "{counters:?}");
+    }
+    let sum = |of: fn(&Counters) -> u32| counted.iter().map(of).sum::<u32>();
+    assert!(sum(|c| c.bad_crc) > 0 && sum(|c| c.missing) > 0, "{counted:?}");
+}
+
+#[test]
+fn a_device_that_hangs_up_is_waited_for() {
+    let (folder, pictures) = scene();
+    let folder = folder.path();
+    let calib = within(folder, "calib.yaml");
+    let plain = serve(folder, &pictures, intact, usize::MAX);
+    prepare(folder, &plain);
+    // The same device behind a relay that hangs up in the middle of the second pair.
+    let relay = within(folder, "relay.socket");
+    let listener = UnixListener::bind(&relay).unwrap();
+    thread::spawn(move || {
+        let mut limit = 3000;
+        for stream in listener.incoming() {
+            let mut host = stream.unwrap();
+            let mut device = Address::Socket(plain.clone()).open(0).unwrap();
+            let mut commands = host.try_clone().unwrap();
+            let up = thread::spawn(move || drop(std::io::copy(&mut commands, &mut device.writer)));
+            let (mut passed, mut buffer) = (0, [0; 256]);
+            while passed < limit {
+                match device.reader.read(&mut buffer) {
+                    Ok(count @ 1..) => {
+                        passed += count;
+                        if host.write_all(&buffer[..count]).is_err() {
+                            break;
+                        }
+                    }
+                    Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
+                    _ => break,
+                }
+            }
+            let _ = host.shutdown(std::net::Shutdown::Both);
+            up.join().unwrap();
+            limit = usize::MAX;
+        }
+    });
+    let (out, tape) = (within(folder, "out"), within(folder, "tape"));
+    host(&["listen", "--port", &relay, "--calib", &calib, "--frames", "4", "--out", &out, "--record", &tape])
+        .unwrap();
+    let truth = direct(folder);
+    for pair in 1..=4 {
+        assert!(model(&folder.join(format!("out/{pair:06}"))) == truth, "pair {pair}");
+    }
+    assert_eq!(Recording::read(Path::new(&tape)).unwrap().connections.len(), 2);
+}
+
+#[test]
+fn a_pseudo_terminal_is_a_port() {
+    use serialport::SerialPort;
+    let (folder, pictures) = scene();
+    let (mut master, slave) = serialport::TTYPort::pair().unwrap();
+    let name = slave.name().unwrap();
+    master.set_timeout(Duration::from_millis(1)).unwrap();
+    let theirs = pictures.clone();
+    thread::spawn(move || {
+        let writer = master.try_clone_native().unwrap();
+        let mut port = Port { reader: Box::new(master), writer: Box::new(writer) };
+        let mut bench = device(theirs);
+        loop {
+            // Between two openings of the other end nobody is there.
+            carry(&mut bench, &mut port, intact, usize::MAX);
+            thread::sleep(Duration::from_millis(5));
+        }
+    });
+    drop(slave);
+    let folder = folder.path();
+    prepare(folder, &name);
+    let (calib, out) = (within(folder, "calib.yaml"), within(folder, "out"));
+    host(&["listen", "--port", &name, "--calib", &calib, "--frames", "1", "--out", &out]).unwrap();
+    assert!(model(&folder.join("out/000001")) == direct(folder));
+}
+
+/// A peer that sends the same bytes to whoever connects.
+fn peer(folder: &Path, bytes: Vec<u8>) -> String {
+    let path = folder.join("peer.socket");
+    let listener = UnixListener::bind(&path).unwrap();
+    thread::spawn(move || {
+        let mut kept = Vec::new();
+        for stream in listener.incoming() {
+            let mut stream = stream.unwrap();
+            stream.write_all(&bytes).unwrap();
+            kept.push(stream);
+        }
+    });
+    path.display().to_string()
+}
+
+#[test]
+fn strangers_are_told_from_devices() {
+    let folder = TempDir::new().unwrap();
+    let newer = peer(folder.path(), link::frame(1, 0, &[2, 0, 1, 2, 3]));
+    let refused = host(&["device", "info", "--port", &newer]).unwrap_err();
+    assert!(refused.contains("version 2") && refused.contains("version 1"), "{refused}");
+
+    let folder = TempDir::new().unwrap();
+    let chatter = peer(folder.path(), vec![0x41; 100_000]);
+    let refused = host(&["device", "info", "--port", &chatter]).unwrap_err();
+    assert!(refused.contains("no hello"), "{refused}");
+
+    let gone = within(folder.path(), "nobody");
+    assert!(host(&["device", "info", "--port", &gone]).unwrap_err().contains("there is no port"));
+}
