@@ -1,15 +1,17 @@
 //! Ossature on a microcontroller: the core of `shared`, run where the pictures are taken.
 //!
-//! What stands so far is what the device needs from its board ([`ports`]), a driver for two camera modules
-//! ([`camera`]), the memory that the core borrows ([`memory`]) and a self-test that runs the whole pipeline on
-//! drawn pictures ([`selftest`]). [`stages`] holds boards against a PC, [`record`] keeps a calibration in flash, and
-//! `board/`, which alone may touch registers, makes ports of what boards have. The device's event loop
-//! (`device.rs`) comes beside them.
+//! [`device`] decides: events in, actions out, no I/O. [`drive`] carries its actions out through the traits
+//! of [`ports`], on a board, in an emulator and on a PC alike. [`memory`] is what the core borrows, `camera`
+//! drives the eyes over embedded-hal 1.0, [`record`] keeps a calibration in flash, [`selftest`] runs the core on
+//! drawn pictures, and [`stages`] holds a board against a PC. Registers belong to `board/` alone, which makes
+//! ports of what boards have.
 #![no_std]
 
 #[cfg(target_os = "none")]
 pub mod board;
 pub mod camera;
+pub mod device;
+pub mod drive;
 pub mod memory;
 pub mod ports;
 pub mod record;

@@ -1,7 +1,7 @@
 //! What the device needs from the board: two cameras, a link, a clock, and flash for the calibration.
 //!
-//! The board's main loop owns these and carries frames and bytes between them and the device; the device
-//! itself does no I/O. Every call ends: what waits, waits for a stated time at most.
+//! The board's main owns these; [`drive`](crate::drive) carries frames and bytes between them and the
+//! device, which itself does no I/O. Every call ends: what waits, waits for a stated time at most.
 
 use core::ops::RangeInclusive;
 pub use shared::pipeline::Side;
@@ -211,7 +211,7 @@ pub trait Flash {
     /// A buffer that is too short, a record that is damaged, a failing memory.
     fn load(&mut self, buffer: &mut [u8]) -> Result<usize, FlashError>;
 
-    /// Replace the record. Whatever happens meanwhile, the old one or the new one stands whole.
+    /// Replace the record; an empty one is as none. Whatever happens meanwhile, the old one or the new one stands whole.
     ///
     /// # Errors
     /// Too many bytes, or a failing memory.
@@ -227,4 +227,11 @@ pub enum FlashError {
     Damaged,
     /// The memory does not erase, write or read.
     Failing,
+}
+
+/// Resets the board unless it is fed in time: later than the longest call of these ports and the longest step
+/// of the core take, together some seconds.
+pub trait Watchdog {
+    /// All is well.
+    fn feed(&mut self);
 }

@@ -23,7 +23,7 @@ use heapless::VecView;
 const WORDS: &str = "words of scratch";
 
 /// What one eye's picture gives beside its lists.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct EyeFigures {
     pub(super) size: Size,
     pub(super) area: u32,

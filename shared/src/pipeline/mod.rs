@@ -171,17 +171,18 @@ pub fn run(
 
 /// A run in its steps, for a device that has room for but one picture at a time: outline and skeleton of
 /// the left eye, then of the right one, then the pair.
-pub struct Run<'s> {
-    settings: &'s Settings,
+#[derive(Debug)]
+pub struct Run {
+    settings: Settings,
     gates: Gates,
     figures: [Option<EyeFigures>; 2],
 }
 
-impl<'s> Run<'s> {
+impl Run {
     /// A new run, which forgets what an earlier one left in the memory.
-    pub fn new(memory: &mut Memory<'_>, settings: &'s Settings) -> Self {
+    pub fn new(memory: &mut Memory<'_>, settings: &Settings) -> Self {
         memory.clear();
-        Self { settings, gates: Gates::new(settings), figures: [None; 2] }
+        Self { settings: *settings, gates: Gates::new(settings), figures: [None; 2] }
     }
 
     /// From an eye's picture to mask and contour. The picture is not needed any more after this.
@@ -196,7 +197,7 @@ impl<'s> Run<'s> {
         scratch: Arena<'_>,
         observer: &mut impl Observer,
     ) -> Result<(), Finding> {
-        let figures = eye::outline(side, grey, eye, scratch, self.settings, &mut self.gates, observer)?;
+        let figures = eye::outline(side, grey, eye, scratch, &self.settings, &mut self.gates, observer)?;
         self.figures[side as usize] = Some(figures);
         Ok(())
     }
@@ -214,7 +215,7 @@ impl<'s> Run<'s> {
         observer: &mut impl Observer,
     ) -> Result<(), Finding> {
         let figures = self.figures[side as usize].ok_or(Finding::NoObject(side, 0))?;
-        eye::skeleton((side, figures.size), eye, scratch, self.settings, &mut self.gates, observer)
+        eye::skeleton((side, figures.size), eye, scratch, &self.settings, &mut self.gates, observer)
     }
 
     /// From both eyes to the described pair.
@@ -227,7 +228,7 @@ impl<'s> Run<'s> {
             return Err(Finding::NoObject(side, 0));
         };
         compare(&[left, right], &mut self.gates)?;
-        let (settings, gates) = (self.settings, &mut self.gates);
+        let (settings, gates) = (&self.settings, &mut self.gates);
         match settings.method {
             Method::Default => default::match_views(memory, left.size, settings, gates, observer)?,
             Method::Paper(paper) => paper::match_as_paper(memory, left.size, paper, gates, observer)?,

@@ -41,7 +41,9 @@ codes! {
     /// The calibration could not be stored or erased.
     Storage = 6,
     /// A camera does not answer.
-    Camera = 7
+    Camera = 7,
+    /// Pairs cannot be described without a calibration, and the device keeps none.
+    Uncalibrated = 8
 }
 
 /// How a picture was taken.
@@ -58,7 +60,7 @@ pub struct Exposure {
 pub struct PairReport<'a> {
     /// Its number since the device started.
     pub number: u32,
-    /// When the left and the right picture began, us since the device started.
+    /// When the left and the right picture were complete, us since the device started.
     pub stamps: [u64; 2],
     /// Levels between object and background, 0 in an eye that was not looked at.
     pub levels: [u8; 2],
@@ -69,7 +71,7 @@ pub struct PairReport<'a> {
 }
 
 impl PairReport<'_> {
-    /// How much later the right picture began than the left one, us.
+    /// How much later the right picture was complete than the left one, us.
     pub const fn gap(&self) -> i64 {
         self.stamps[1].wrapping_sub(self.stamps[0]).cast_signed()
     }
@@ -96,6 +98,8 @@ pub struct Health {
     pub rejected_frames: u32,
     /// Times that the watchdog bit since it was switched on.
     pub watchdog_resets: u32,
+    /// Times that the calibration's memory failed or was found damaged.
+    pub storage_faults: u32,
 }
 
 /// What became of a command.
@@ -228,6 +232,7 @@ impl Health {
             self.rejected_bytes,
             self.rejected_frames,
             self.watchdog_resets,
+            self.storage_faults,
         ] {
             writer.u32(counter);
         }
@@ -244,6 +249,7 @@ impl Health {
             rejected_bytes: reader.u32()?,
             rejected_frames: reader.u32()?,
             watchdog_resets: reader.u32()?,
+            storage_faults: reader.u32()?,
         })
     }
 }

@@ -4,6 +4,7 @@ pub mod board;
 pub mod camera;
 pub mod cases;
 pub mod core;
+pub mod device;
 pub mod graph;
 pub mod link;
 pub mod matching;

@@ -209,6 +209,7 @@ pub const HEALTH: Health = Health {
     rejected_bytes: 300,
     rejected_frames: 2,
     watchdog_resets: 0,
+    storage_faults: 1,
 };
 
 /// Rows of the right picture, from the third on.
