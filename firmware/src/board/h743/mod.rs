@@ -11,19 +11,20 @@ mod reset;
 mod usb;
 mod watchdog;
 
-pub use lamps::{Lamps, State};
+pub use lamps::Lamps;
 pub use link::Link;
-pub use reset::Reset;
 pub use watchdog::Watchdog;
 
 use crate::camera::pair::{Module, Pair};
+use crate::device::Birth;
+use crate::drive::Ports;
 use crate::ports;
 use crate::record::Record;
 use cortex_m::Peripherals;
 use defmt_rtt as _;
 use embassy_executor::InterruptExecutor;
 use embassy_stm32::flash::{Blocking, Flash};
-use embassy_stm32::gpio::{AnyPin, Input, Level, Output, Pull, Speed};
+use embassy_stm32::gpio::{AnyPin, Level, Output, Speed};
 use embassy_stm32::i2c::{self, I2c, Master};
 use embassy_stm32::interrupt::{self, InterruptExt as _, Priority};
 use embassy_stm32::mode::Blocking as Polled;
@@ -76,22 +77,13 @@ impl ports::Clock for Clock {
 
 /// What the board has.
 pub struct Board {
-    /// Both eyes, not started yet.
-    pub cameras: Cameras,
-    /// The host, on USB or behind ST-Link.
-    pub link: Link,
-    /// Time.
-    pub clock: Clock,
-    /// Where the calibration is kept.
-    pub flash: Record<Flash<'static, Blocking>>,
-    /// Resets the board unless it is fed every few seconds.
-    pub watchdog: Watchdog,
+    /// What a device reaches: both eyes, not started yet; the host, on USB or behind ST-Link; time; the end of
+    /// flash; the watchdog.
+    pub ports: Ports<Cameras, Link, Clock, Record<Flash<'static, Blocking>>, Watchdog>,
     /// Three lamps.
     pub lamps: Lamps,
-    /// The blue button; high while it is pressed.
-    pub button: Input<'static>,
-    /// Why the board has started, and how often it hung.
-    pub reset: Reset,
+    /// Its name, why it has started, and how often it hung.
+    pub birth: Birth,
 }
 
 impl Board {
@@ -99,7 +91,7 @@ impl Board {
     pub fn take() -> Option<Self> {
         let mut core = Peripherals::take()?;
         let p = embassy_stm32::init(clocks::configuration());
-        let reset = Reset::recall();
+        let birth = reset::recall("NUCLEO-H743ZI2");
         // No master but the processor touches memory: there is no DMA, so caches cannot go stale.
         core.SCB.enable_icache();
         core.SCB.enable_dcache(&mut core.CPUID);
@@ -141,14 +133,15 @@ impl Board {
                 .expect("a speed that divides the clock");
 
         Some(Self {
-            cameras: Pair::new(left, right, Delay, Clock),
-            link: Link::new(serial),
-            clock: Clock,
-            flash: Record::new(Flash::new_blocking(p.FLASH), CALIBRATION),
-            watchdog: Watchdog::new(p.IWDG1),
+            ports: Ports {
+                cameras: Pair::new(left, right, Delay, Clock),
+                link: Link::new(serial),
+                clock: Clock,
+                flash: Record::new(Flash::new_blocking(p.FLASH), CALIBRATION),
+                watchdog: Watchdog::new(p.IWDG1),
+            },
             lamps: Lamps::new([p.PB0.into(), p.PE1.into(), p.PB14.into()]),
-            button: Input::new(p.PC13, Pull::None),
-            reset,
+            birth,
         })
     }
 }
