@@ -27,13 +27,11 @@ mod session;
 mod telling;
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::ValueEnum;
 
 use super::options::{CameraArgs, MethodArgs, NoCalibration, SceneArgs, positive, usage};
-use super::{Failure, note, told};
+use super::{Failure, interruption, note, told};
 use crate::source::v4l::choose::{Choice, Request, Size, choose};
 use crate::source::v4l::device::Device;
 use crate::source::v4l::errors::CameraError;
@@ -206,20 +204,6 @@ fn told_choice(path: &Path, choice: &Choice, kernel: &Kernel) -> String {
     let rate = kernel.period().map(|period| format!(" at {:.0}/s", 1.0 / period.as_secs_f64()));
     let rate = rate.unwrap_or_default();
     format!("{}: {} {width}x{height}{rate}, {}", path.display(), choice.code, choice.layout.name())
-}
-
-/// Set by Ctrl-C and by the signals that ask a program to end; the second one ends it.
-fn interruption() -> Result<Arc<AtomicBool>, Failure> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let set = Arc::clone(&stop);
-    let handler = move || {
-        if set.swap(true, Ordering::Relaxed) {
-            // As a shell tells a program that Ctrl-C ended.
-            std::process::exit(130);
-        }
-    };
-    ctrlc::set_handler(handler).map_err(|error| format!("cannot listen to Ctrl-C: {error}"))?;
-    Ok(stop)
 }
 
 fn frame_size(text: &str) -> Result<Size, String> {

@@ -1,8 +1,9 @@
-//! The cameras of this machine: what `host capture --device` takes.
+//! The cameras and camera devices of this machine: what `host capture --device` and `host listen --port` take.
 //!
-//! For each: its device, name, bus and driver; the formats, sizes and rates that it offers; and what
+//! For each camera: its device, name, bus and driver; the formats, sizes and rates that it offers; and what
 //! `host capture` would take if nothing else were said. Nodes that take no pictures, such as the metadata node
-//! of every USB camera, are left out.
+//! of every USB camera, are left out. For each serial port: what it says on USB, and whether `--port auto` would
+//! take it.
 //!
 //! Examples:
 //!   host list-devices
@@ -12,6 +13,7 @@ use serde_json::{Value, json};
 
 use super::table::Table;
 use super::{Failure, say, say_json, words_of};
+use crate::source::serial::list::{SerialPort, ports as serial_ports};
 use crate::source::v4l::choose::{Camera, Choice, Offer, Request, Sizes, choose, sizes_in_words};
 use crate::source::v4l::errors::CameraError;
 use crate::source::v4l::kernel;
@@ -33,11 +35,29 @@ type Found = Result<Camera, CameraError>;
 ///
 /// If the system has no such devices at all.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let cameras = kernel::list()?;
+    let (cameras, ports) = (kernel::list()?, serial_ports()?);
     if args.json {
-        return say_json(&json!({ "cameras": cameras.iter().map(camera_as_json).collect::<Vec<_>>() }));
+        return say_json(&json!({
+            "cameras": cameras.iter().map(camera_as_json).collect::<Vec<_>>(),
+            "serial_ports": ports.iter().map(port_as_json).collect::<Vec<_>>(),
+        }));
     }
-    say(&cameras_as_text(&cameras))
+    say(&(cameras_as_text(&cameras) + &ports_as_text(&ports)))
+}
+
+fn ports_as_text(ports: &[SerialPort]) -> String {
+    if ports.is_empty() {
+        return "no serial port: plug a camera device in\n".into();
+    }
+    ports.iter().map(|port| port.line() + "\n").collect()
+}
+
+fn port_as_json(port: &SerialPort) -> Value {
+    let usb = port
+        .usb
+        .as_ref()
+        .map(|usb| json!({ "vendor": usb.vendor, "product": usb.product, "names": usb.names }));
+    json!({ "port": port.path, "usb": usb, "is_taken_by_auto": port.is_device() })
 }
 
 fn cameras_as_text(cameras: &[Found]) -> String {
@@ -161,5 +181,8 @@ mod tests {
         assert_eq!(told["taken"]["layout"], "side-by-side");
         assert_eq!(told["formats"][1]["is_read"], false);
         assert!(cameras_as_text(&[]).contains("plug one in"));
+        let port = SerialPort { path: "/dev/ttyS0".into(), usb: None };
+        assert_eq!(ports_as_text(std::slice::from_ref(&port)), "/dev/ttyS0  not on USB\n");
+        assert_eq!(port_as_json(&port)["is_taken_by_auto"], false);
     }
 }

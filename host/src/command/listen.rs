@@ -18,6 +18,7 @@
 //!   host listen --port unix:/tmp/camera --calib calib.yaml --record cup.link --json
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -33,7 +34,7 @@ use super::connect::{
 use super::model::{self, Model};
 use super::options::GrowArgs;
 use super::table::{count, sides};
-use super::{Failure, note, say, words_of};
+use super::{Failure, interruption, note, say, words_of};
 use crate::reconstruct::Options;
 use crate::report::words::{parse_polarity, parse_threshold};
 use crate::source::serial::inbox::{Hello, Inbox, Message, Pair};
@@ -89,9 +90,12 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let end = args.seconds.map(|seconds| Instant::now() + Duration::from_secs(seconds.into()));
     let recording = args.record.as_ref().map(|path| Writer::begin(path, &model)).transpose()?;
     let tap = recording.map(|writer| Arc::new(Mutex::new(writer)));
+    let stop = interruption()?;
     let (mut session, hello) = args.port.begin(tap)?;
     desk.greeted(&hello)?;
-    let heard = listen(args, &mut session, &mut desk, end);
+    let heard = listen(args, &mut session, &mut desk, || {
+        stop.load(Ordering::Relaxed) || end.is_some_and(|end| Instant::now() >= end)
+    });
     // The device may be gone; it stops by itself when it starts anew.
     let stopped = heard.as_ref().map_or(Ok(()), |()| session.order(&ToDevice::Stop));
     if stopped.is_err() {
@@ -105,10 +109,10 @@ fn listen(
     args: &Args,
     session: &mut Session,
     desk: &mut Desk<'_>,
-    end: Option<Instant>,
+    over: impl Fn() -> bool,
 ) -> Result<(), Failure> {
     start(args, session)?;
-    while args.frames.is_none_or(|frames| desk.pairs < frames) && end.is_none_or(|end| Instant::now() < end) {
+    while args.frames.is_none_or(|frames| desk.pairs < frames) && !over() {
         match session.receive(LOOK) {
             Ok(Some((message, first))) => {
                 if first && matches!(message, Message::Hello(_)) {
@@ -120,7 +124,7 @@ fn listen(
             Ok(None) => {}
             Err(error) if error.is_loss() => {
                 desk.remark(&format!("{}; waiting for the device", words_of(&error)));
-                let Some(hello) = session.resume(end)? else { break };
+                let Some(hello) = session.resume(&over)? else { break };
                 desk.greeted(&hello)?;
                 start(args, session)?;
             }

@@ -9,7 +9,7 @@
 //!   host listen --calib calib.yaml          models from a camera device
 //!   host render mesh.obj --out pair         a pair of any mesh that you have
 //!   host evaluate model.ply truth.ply       how far a model is from the truth
-//!   host list-devices                       cameras that are plugged in
+//!   host list-devices                       cameras and boards that are plugged in
 //!   host capture --device /dev/video0 --calib calib.yaml
 //!   host experiments                        the paper's experiments, rerun
 //!
@@ -36,6 +36,8 @@ mod table;
 
 use std::error::Error;
 use std::io::{self, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::{Parser, Subcommand};
 
@@ -64,7 +66,7 @@ enum Command {
     /// Models from a camera
     #[command(long_about = page(include_str!("capture.rs")))]
     Capture(capture::Args),
-    /// Cameras that are plugged in
+    /// Cameras and boards that are plugged in
     #[command(long_about = page(include_str!("list_devices.rs")))]
     ListDevices(list_devices::Args),
     /// Whether a calibration is right
@@ -161,6 +163,20 @@ fn told<T>(json: bool, result: Result<T, Failure>) -> Result<T, Failure> {
         let _ = say_json(&serde_json::json!({ "error": words_of(&**failure) }));
     }
     result
+}
+
+/// Set by Ctrl-C and by the signals that ask a program to end; the second one ends it.
+fn interruption() -> Result<Arc<AtomicBool>, Failure> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let set = Arc::clone(&stop);
+    let handler = move || {
+        if set.swap(true, Ordering::Relaxed) {
+            // As a shell tells a program that Ctrl-C ended.
+            std::process::exit(130);
+        }
+    };
+    ctrlc::set_handler(handler).map_err(|error| format!("cannot listen to Ctrl-C: {error}"))?;
+    Ok(stop)
 }
 
 /// Writes a line to standard error, if anybody listens.

@@ -161,13 +161,13 @@ impl Session {
         Ok((session, hello))
     }
 
-    /// Wait for a device that is gone until this time, and exchange hellos again; nothing if it stays away.
+    /// Wait for a device that is gone, until `over`, and exchange hellos again; nothing if it stays away.
     ///
     /// # Errors
     /// A [`SessionError`] other than that it is gone.
-    pub fn resume(&mut self, until: Option<Instant>) -> Result<Option<Hello>, SessionError> {
+    pub fn resume(&mut self, over: impl Fn() -> bool) -> Result<Option<Hello>, SessionError> {
         loop {
-            if until.is_some_and(|until| Instant::now() >= until) {
+            if over() {
                 return Ok(None);
             }
             thread::sleep(LOOK_AGAIN);
