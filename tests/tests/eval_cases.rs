@@ -8,7 +8,7 @@ use host::reconstruct::{Mode, Options, Profile, Reconstruction, Refusal, Skeleto
 use host::view::Pinhole;
 use oracle::cases::{cases, folder, name};
 use shared::fixed::ONE;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 fn run(case: &Path, options: &Options) -> Result<Reconstruction, Refusal> {
     let open = |name: &str| image::open(case.join(name)).unwrap().to_luma8();
