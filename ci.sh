@@ -138,7 +138,7 @@ part_firmware() {
 # What images take, and the core on emulated boards held against the core on this machine, stage by stage.
 part_qemu() {
     emulator
-    tests cargo test -q --locked -p system-tests --test emulator --test footprint -- --nocapture
+    tests cargo test -q --locked -p system-tests --test emulator --test emulated_link --test footprint -- --nocapture
 }
 
 parts=("$@")

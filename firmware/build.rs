@@ -3,7 +3,8 @@
 use std::env;
 
 /// Images for other boards than the one that `memory.x` is about, and their maps.
-const MAPS: [(&str, &str); 2] = [("stages", "mps2/megabytes.x"), ("selftest", "mps2/small.x")];
+const MAPS: [(&str, &str); 3] =
+    [("device", "mps2/megabytes.x"), ("stages", "mps2/megabytes.x"), ("selftest", "mps2/small.x")];
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");

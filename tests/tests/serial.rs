@@ -2,18 +2,15 @@
 //! damage and loss, what comes out is what the pictures give, or nothing.
 #![cfg(unix)]
 
-use clap::Parser;
-use host::calibration::{Distortion, StereoCamera};
-use host::command::{Cli, words_of};
 use host::shape::Shape;
 use host::source::serial::link::frames;
 use host::source::serial::port::{Address, Port};
 use host::source::serial::recording::Recording;
-use nalgebra::Rotation3;
 use oracle::camera::Time;
 use oracle::device::{Bench, Eyes, Page};
 use oracle::link;
-use oracle::scene::{Pair, camera, pair};
+use oracle::program::{host, model, within};
+use oracle::scene::{Pair, bent_camera, camera, pair};
 use shared::wire::{Counters, Decoder, MAX_FRAME};
 use std::cell::RefCell;
 use std::fs;
@@ -30,18 +27,7 @@ const SHAPE: Shape = Shape::Screwdriver;
 /// A folder with a calibration whose cameras bend and turn a little, and the raw pictures of a device.
 fn scene() -> (TempDir, Pair) {
     let folder = TempDir::new().unwrap();
-    let bent = camera(2);
-    let mut lens = [0.0; 12];
-    lens[0] = -0.02;
-    let lens = Distortion::Polynomial(lens);
-    let turn = Rotation3::from_euler_angles(0.0, 0.004, 0.0);
-    let calibration = StereoCamera {
-        left: host::calibration::Camera { distortion: lens, ..bent.left },
-        right: host::calibration::Camera { distortion: lens, ..bent.right },
-        rotation: turn.into_inner(),
-        translation: turn * bent.translation,
-    };
-    calibration.write_opencv_yaml(folder.path().join("calib.yaml")).unwrap();
+    bent_camera(2).write_opencv_yaml(folder.path().join("calib.yaml")).unwrap();
     let pictures = pair(SHAPE, 2);
     for (name, picture) in ["left.png", "right.png"].iter().zip(&pictures) {
         picture.save(folder.path().join(name)).unwrap();
@@ -100,21 +86,6 @@ fn serve(folder: &Path, pictures: &Pair, fault: Fault, hang_up: usize) -> String
         }
     });
     path.display().to_string()
-}
-
-/// The program's result, as an exit code and its sentence.
-fn host(args: &[&str]) -> Result<(), String> {
-    let cli = Cli::try_parse_from([&["host"], args].concat()).unwrap_or_else(|error| panic!("{error}"));
-    cli.run().map_err(|failure| words_of(&*failure))
-}
-
-fn within(folder: &Path, name: &str) -> String {
-    folder.join(name).display().to_string()
-}
-
-/// The surface, the skeleton and the boundary of a model.
-fn model(folder: &Path) -> [Vec<u8>; 3] {
-    ["model.ply", "skeleton.ply", "boundary.ply"].map(|name| fs::read(folder.join(name)).unwrap())
 }
 
 /// The report, but for its times.

@@ -8,11 +8,9 @@
 
 #[cfg(target_os = "none")]
 mod board {
-    use core::ffi::CStr;
-    use firmware::board::mps2::{Board, Timer};
+    use firmware::board::mps2::{Board, Timer, argument};
     use firmware::memory::{Capacities, Qvga, Storage, Vga};
     use firmware::stages::{Stages, run};
-    use semihosting::experimental::env::args;
     use semihosting::fs::File;
     use semihosting::io::Read;
     use semihosting::{println, process};
@@ -69,12 +67,7 @@ mod board {
     #[cortex_m_rt::entry]
     fn main() -> ! {
         let timer = Board::take().expect("taken once").timer;
-        let arguments = args::<1024>().expect("arguments");
-        let path = (&arguments).into_iter().nth(1).expect("usage: stages PAIRS").expect("text");
-        let mut name = [0; 1024];
-        name[..path.len()].copy_from_slice(path.as_bytes());
-        let path = CStr::from_bytes_until_nul(&name).expect("ended by zero");
-        let mut file = File::open(path).unwrap_or_else(|_| panic!("cannot open {path:?}"));
+        let mut file = argument();
 
         let (qvga, vga, scratch, pictures) = (QVGA.take(), VGA.take(), ALL_SCRATCH.take(), PICTURES.take());
         let mut number = 0;

@@ -1,8 +1,9 @@
 //! Images for emulated boards: built, and run in QEMU.
 
 use assert_cmd::Command;
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::{Command as Tool, Stdio};
+use std::process::{Child, Command as Tool, Stdio};
 use std::time::Duration;
 
 /// The processor of all boards.
@@ -50,13 +51,8 @@ pub fn build(image: &str, features: &str) -> Option<PathBuf> {
     Some(target.join(TARGET).join("release").join(image))
 }
 
-/// Run an image of the `mps2` boards on one of [`MACHINES`], with arguments and for `limit` at most; what
-/// it prints. Nothing where QEMU is missing.
-///
-/// # Panics
-/// When it does not end, or does so with another code than 0: 101 is a panic, 70 a hard fault, 134 a fault
-/// within a fault, such as a stack that is too small.
-pub fn run(machine: &str, image: &Path, arguments: &[&Path], limit: Duration) -> Option<String> {
+/// QEMU as one of [`MACHINES`] with an image and its arguments; nothing where QEMU is missing.
+fn emulator(machine: &str, image: &Path, arguments: &[&Path]) -> Option<Tool> {
     let qemu = "qemu-system-arm";
     if is_missing(qemu, runs(qemu, &["--version"]).is_none(), &format!("apt-get install {qemu}")) {
         return None;
@@ -64,10 +60,21 @@ pub fn run(machine: &str, image: &Path, arguments: &[&Path], limit: Duration) ->
     let semihosting = arguments.iter().fold("enable=on,target=native,arg=image".to_owned(), |all, one| {
         all + ",arg=" + one.to_str().expect("paths are text")
     });
-    let output = Command::new(qemu)
-        .args(["-M", machine, "-nographic", "-icount", "shift=3,align=off,sleep=off"])
-        .args(["-semihosting-config", &semihosting, "-kernel"])
-        .arg(image)
+    let mut tool = Tool::new(qemu);
+    tool.args(["-M", machine, "-nographic", "-semihosting-config", &semihosting, "-kernel"]).arg(image);
+    Some(tool)
+}
+
+/// Run an image of the `mps2` boards on one of [`MACHINES`], with arguments and for `limit` at most; what
+/// it prints. Nothing where QEMU is missing.
+///
+/// # Panics
+/// When it does not end, or does so with another code than 0: 101 is a panic, 70 a hard fault, 134 a fault
+/// within a fault, such as a stack that is too small.
+pub fn run(machine: &str, image: &Path, arguments: &[&Path], limit: Duration) -> Option<String> {
+    let emulator = emulator(machine, image, arguments)?;
+    let output = Command::from_std(emulator)
+        .args(["-icount", "shift=3,align=off,sleep=off"])
         .timeout(limit)
         .output()
         .expect("it runs");
@@ -75,4 +82,41 @@ pub fn run(machine: &str, image: &Path, arguments: &[&Path], limit: Duration) ->
         (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
     assert!(output.status.success(), "{machine}: {}\n{said}\n{complained}", output.status);
     Some(said.into_owned())
+}
+
+/// A board that runs until it is dropped.
+#[derive(Debug)]
+pub struct Running(Child);
+
+/// Let an image that does not end run on one of [`MACHINES`], with arguments and with this for QEMU's serial
+/// line; nothing where QEMU is missing.
+///
+/// # Panics
+/// When QEMU does not start.
+pub fn start(machine: &str, image: &Path, arguments: &[&Path], serial: &[&str]) -> Option<Running> {
+    let mut emulator = emulator(machine, image, arguments)?;
+    emulator.args(["-monitor", "none"]).args(serial).stdin(Stdio::null()).stdout(Stdio::piped());
+    Some(Running(emulator.spawn().expect("it starts")))
+}
+
+impl Running {
+    /// The pseudo-terminal that is the serial line of a board started with `-serial pty`.
+    ///
+    /// # Panics
+    /// When QEMU does not say which, or has said it before.
+    pub fn terminal(&mut self) -> String {
+        let mut said = String::new();
+        let output = self.0.stdout.take().expect("asked once");
+        BufReader::new(output).read_line(&mut said).expect("QEMU speaks");
+        let name = said.split_whitespace().find(|word| word.starts_with("/dev/"));
+        name.unwrap_or_else(|| panic!("QEMU said {said:?}")).to_owned()
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        // It may have ended by itself, which a test sees by what it says.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
 }

@@ -10,6 +10,7 @@ pub mod link;
 pub mod matching;
 pub mod mesh_checker;
 pub mod nurbs;
+pub mod program;
 pub mod raster;
 pub mod scene;
 pub mod wire;

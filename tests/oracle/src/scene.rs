@@ -1,11 +1,12 @@
 //! Pairs of pictures of the built-in shapes, rendered once, and pairs that are drawn.
 
-use host::calibration::StereoCamera;
+use host::calibration::{Camera, Distortion, StereoCamera};
 use host::reconstruct::{Options, Reconstruction, Refusal, reconstruct};
 use host::render::render;
 use host::shape::Shape;
 use host::view::Pinhole;
 use image::{GrayImage, Luma};
+use nalgebra::Rotation3;
 use std::collections::BTreeMap;
 use std::sync::{LazyLock, Mutex, PoisonError};
 
@@ -18,6 +19,22 @@ pub type Scale = u32;
 /// The calibration of the pictures at a scale.
 pub fn camera(scale: Scale) -> StereoCamera {
     StereoCamera::rectified(640 / scale, 480 / scale, 750.0 / f64::from(scale), 60.0)
+}
+
+/// The calibration of cameras that see what those of [`camera`] see nearly: their lenses bend, and the right one
+/// is turned.
+pub fn bent_camera(scale: Scale) -> StereoCamera {
+    let straight = camera(scale);
+    let mut lens = [0.0; 12];
+    lens[0] = -0.02;
+    let distortion = Distortion::Polynomial(lens);
+    let turn = Rotation3::from_euler_angles(0.0, 0.004, 0.0);
+    StereoCamera {
+        left: Camera { distortion, ..straight.left },
+        right: Camera { distortion, ..straight.right },
+        rotation: turn.into_inner(),
+        translation: turn * straight.translation,
+    }
 }
 
 /// What both eyes see of a shape; rendered once a process.

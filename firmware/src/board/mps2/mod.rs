@@ -2,14 +2,23 @@
 //! that one image runs on both. Files, arguments and exit codes go through semihosting: the `semihosting`
 //! crate, whose panic handler says why and exits with 101.
 
+mod eyes;
 mod fault;
+mod files;
+mod flash;
 mod register;
 mod timer;
 mod uart;
+mod watchdog;
 
+pub use eyes::Eyes;
+pub use files::argument;
+pub use flash::Flash;
 pub use timer::{Clock, Timer};
 pub use uart::Uart;
+pub use watchdog::Watchdog;
 
+use crate::record::Record;
 use cortex_m::Peripherals;
 
 /// What a board has.
@@ -21,6 +30,10 @@ pub struct Board {
     pub clock: Clock,
     /// Counts instructions.
     pub timer: Timer,
+    /// Keeps a calibration.
+    pub flash: Record<Flash>,
+    /// Resets the board when it hangs.
+    pub watchdog: Watchdog,
 }
 
 impl Board {
@@ -30,6 +43,8 @@ impl Board {
             uart: Uart::start(),
             clock: Clock::new(Timer::start(0x4000_1000)),
             timer: Timer::start(0x4000_0000),
+            flash: Record::new(Flash::new(), 0),
+            watchdog: Watchdog::new(),
         })
     }
 }

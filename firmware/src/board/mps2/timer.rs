@@ -6,7 +6,7 @@ use crate::stages::Counter;
 use core::cell::Cell;
 
 /// Ticks a microsecond.
-const TICKS: u64 = 25;
+pub(super) const TICKS: u64 = 25;
 /// Instructions a tick when QEMU is told `-icount shift=3`: 8 ns an instruction, 40 ns a tick.
 const INSTRUCTIONS: u32 = 5;
 
@@ -51,7 +51,7 @@ impl Clock {
     }
 }
 
-impl ports::Clock for Clock {
+impl ports::Clock for &Clock {
     fn micros(&self) -> u64 {
         let before = self.ticks.get();
         let passed = self.timer.ticks().wrapping_sub(before as u32);
