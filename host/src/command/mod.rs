@@ -36,8 +36,8 @@ mod table;
 
 use std::error::Error;
 use std::io::{self, Write};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, LazyLock};
 
 use clap::{Parser, Subcommand};
 
@@ -165,18 +165,22 @@ fn told<T>(json: bool, result: Result<T, Failure>) -> Result<T, Failure> {
     result
 }
 
-/// Set by Ctrl-C and by the signals that ask a program to end; the second one ends it.
+/// Set by Ctrl-C and by the signals that ask a program to end; the second one ends it. A process has one, however
+/// many commands it runs.
 fn interruption() -> Result<Arc<AtomicBool>, Failure> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let set = Arc::clone(&stop);
-    let handler = move || {
-        if set.swap(true, Ordering::Relaxed) {
-            // As a shell tells a program that Ctrl-C ended.
-            std::process::exit(130);
-        }
-    };
-    ctrlc::set_handler(handler).map_err(|error| format!("cannot listen to Ctrl-C: {error}"))?;
-    Ok(stop)
+    static STOP: LazyLock<Result<Arc<AtomicBool>, ctrlc::Error>> = LazyLock::new(|| {
+        let stop = Arc::new(AtomicBool::new(false));
+        let set = Arc::clone(&stop);
+        let handler = move || {
+            if set.swap(true, Ordering::Relaxed) {
+                // As a shell tells a program that Ctrl-C ended.
+                std::process::exit(130);
+            }
+        };
+        ctrlc::set_handler(handler).map(|()| stop)
+    });
+    let stop = STOP.as_ref().map_err(|error| format!("cannot listen to Ctrl-C: {error}"))?;
+    Ok(Arc::clone(stop))
 }
 
 /// Writes a line to standard error, if anybody listens.
