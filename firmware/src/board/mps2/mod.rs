@@ -39,9 +39,11 @@ pub struct Board {
 impl Board {
     /// The board, the first time it is asked for.
     pub fn take() -> Option<Self> {
-        Peripherals::take().map(|_| Self {
-            uart: Uart::start(),
-            clock: Clock::new(Timer::start(0x4000_1000)),
+        Peripherals::take()?;
+        let time = Timer::start(0x4000_1000);
+        Some(Self {
+            uart: Uart::start(time.clone()),
+            clock: Clock::new(time),
             timer: Timer::start(0x4000_0000),
             flash: Record::new(Flash::new(), 0),
             watchdog: Watchdog::new(),

@@ -11,7 +11,7 @@ pub(super) const TICKS: u64 = 25;
 const INSTRUCTIONS: u32 = 5;
 
 /// Counts instructions, in steps of five, when QEMU runs with `-icount shift=3,align=off,sleep=off`.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Timer {
     value: Register,
 }
@@ -27,7 +27,7 @@ impl Timer {
     }
 
     /// Ticks since the start; wraps around.
-    fn ticks(&self) -> u32 {
+    pub(super) fn ticks(&self) -> u32 {
         u32::MAX - self.value.read()
     }
 }

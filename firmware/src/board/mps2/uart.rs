@@ -1,6 +1,7 @@
 //! CMSDK APB UART 0: a byte at a time, no interrupts.
 
 use super::register::Register;
+use super::timer::{TICKS, Timer};
 use crate::ports::{self, LinkError};
 
 const DATA: Register = Register::at(0x4000_4000);
@@ -11,16 +12,19 @@ const DIVIDER: Register = Register::at(0x4000_4010);
 const SEND_FULL: u32 = 1;
 const RECEIVE_FULL: u32 = 2;
 
+/// A host that takes nothing for so long is gone, us.
+const PATIENCE: u32 = 5_000_000;
+
 /// The serial line.
 #[derive(Debug)]
-pub struct Uart(());
+pub struct Uart(Timer);
 
 impl Uart {
-    pub(super) fn start() -> Self {
+    pub(super) fn start(timer: Timer) -> Self {
         // The emulator takes any speed but none below 16.
         DIVIDER.write(16);
         CONTROL.write(SEND_FULL | RECEIVE_FULL);
-        Self(())
+        Self(timer)
     }
 }
 
@@ -39,8 +43,13 @@ impl ports::Link for Uart {
 
     fn send(&mut self, bytes: &[u8]) -> Result<(), LinkError> {
         for byte in bytes {
-            // A wire takes everything, in its own time.
-            while STATE.read() & SEND_FULL != 0 {}
+            // Unlike a wire, a program at the other end may be busy or stopped.
+            let since = self.0.ticks();
+            while STATE.read() & SEND_FULL != 0 {
+                if self.0.ticks().wrapping_sub(since) > PATIENCE * TICKS as u32 {
+                    return Err(LinkError::TimeLimit(PATIENCE));
+                }
+            }
             DATA.write(u32::from(*byte));
         }
         Ok(())
