@@ -135,7 +135,8 @@ part_firmware() {
     check cargo build -q -p firmware --target "$TARGET" --release --locked
 }
 
-# What images take, and the core on emulated boards held against the core on this machine, stage by stage.
+# What images take; the core on emulated boards held against the core on this machine, stage by stage; and the
+# whole device on such a board, listened to.
 part_qemu() {
     emulator
     tests cargo test -q --locked -p system-tests --test emulator --test emulated_link --test footprint -- --nocapture
