@@ -9,6 +9,7 @@ use crate::calibration::StereoCamera;
 use crate::memory::Storage;
 use crate::mesh::Mesh;
 use crate::mesh::body::keep_largest_body;
+use crate::source::scene::Known;
 use crate::stage::balls::{self, Ball, Edge, boundary_rays, distance_to_points, distance_to_rays, px2};
 use crate::stage::curve::curve_balls;
 use crate::stage::rectify::{PixelBox, Rectification, RectifiedCamera, RectifyError};
@@ -115,6 +116,8 @@ pub struct Options {
     pub polarity: binarise::Polarity,
     /// Grid spacing of the mesh, mm; by default that of a pixel at the object.
     pub cell: Option<f64>,
+    /// What was done to the images before they came here; told in the report.
+    pub scene: Known,
 }
 
 /// Cells along the diagonal of a mesh at most, unless the user says otherwise.

@@ -8,15 +8,19 @@
 //!   host replay recordings/ --out models    every pair in a folder
 //!   host render mesh.obj --out pair         a pair of any mesh that you have
 //!   host evaluate model.ply truth.ply       how far a model is from the truth
+//!   host list-devices                       cameras that are plugged in
+//!   host capture --device /dev/video0 --calib calib.yaml
 //!   host experiments                        the paper's experiments, rerun
 //!
 //! Exit codes: 0 done, 1 refused or failed, 2 wrong usage.
 
+pub mod capture;
 pub mod completions;
 pub mod demo;
 pub mod evaluate;
 pub mod experiments;
 pub mod inspect;
+pub mod list_devices;
 mod batch;
 mod model;
 pub mod options;
@@ -52,6 +56,12 @@ enum Command {
     /// Models from recorded pairs
     #[command(long_about = page(include_str!("replay.rs")))]
     Replay(replay::Args),
+    /// Models from a camera
+    #[command(long_about = page(include_str!("capture.rs")))]
+    Capture(capture::Args),
+    /// Cameras that are plugged in
+    #[command(long_about = page(include_str!("list_devices.rs")))]
+    ListDevices(list_devices::Args),
     /// A model from a built-in pair, held against the truth
     #[command(long_about = page(include_str!("demo.rs")))]
     Demo(demo::Args),
@@ -81,6 +91,8 @@ impl Cli {
     pub fn run(&self) -> Result<(), Failure> {
         match &self.command {
             Command::Replay(args) => replay::run(args),
+            Command::Capture(args) => capture::run(args),
+            Command::ListDevices(args) => told(args.json, list_devices::run(args)),
             Command::Demo(args) => told(args.json, demo::run(args)),
             Command::Render(args) => render::run(args),
             Command::Evaluate(args) => told(args.json, evaluate::run(args)),

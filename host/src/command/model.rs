@@ -57,14 +57,7 @@ impl Model {
 
     /// Everything that the user should know, in words.
     pub(super) fn warnings(&self) -> Vec<String> {
-        let mut warnings: Vec<String> =
-            self.reconstruction.outcome.findings.iter().map(words::sentence).collect();
-        let (bodies, share) = self.reconstruction.dropped;
-        if bodies > 0 {
-            let pieces = count(bodies, "loose piece", "loose pieces");
-            warnings.push(format!("{pieces} with {} of the volume left out", percent(share)));
-        }
-        warnings
+        warnings(&self.reconstruction)
     }
 
     /// Adds what people want to know to a table.
@@ -75,4 +68,15 @@ impl Model {
         table.row("distance", &format!("{distance:.0} mm from the left camera"));
         table.row("model", &format!("{} vertices, {} faces", mesh.vertices.len(), mesh.faces.len()));
     }
+}
+
+/// Everything that the user should know about a reconstruction, in words.
+pub(super) fn warnings(made: &Reconstruction) -> Vec<String> {
+    let mut warnings: Vec<String> = made.outcome.findings.iter().map(words::sentence).collect();
+    let (bodies, share) = made.dropped;
+    if bodies > 0 {
+        let pieces = count(bodies, "loose piece", "loose pieces");
+        warnings.push(format!("{pieces} with {} of the volume left out", percent(share)));
+    }
+    warnings
 }

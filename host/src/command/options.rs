@@ -1,6 +1,6 @@
 //! What the commands that reconstruct have in common: the choices of the method, and the cameras.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory, ValueEnum};
@@ -8,11 +8,12 @@ use image::GrayImage;
 use shared::stage::binarise::{Polarity, Threshold};
 use shared::stage::thinning::Rule;
 
-use super::{Cli, Failure};
+use super::{Cli, Failure, words_of};
 use crate::calibration::StereoCamera;
 use crate::reconstruct::{self, Options, Pieces, Profile, Radius, Skeleton};
 use crate::report::words::{parse_polarity, parse_rule, parse_threshold};
-use crate::source::Pair;
+use crate::source::scene::{self, BackgroundError, Known, Region, Scene};
+use crate::source::{Layout, Pair};
 
 /// Shortest and longest focal length that is believed, image widths: 136 and 3 degrees of view.
 const FOCALS: [f64; 2] = [0.2, 20.0];
@@ -98,6 +99,7 @@ impl MethodArgs {
             threshold: self.threshold,
             polarity: self.polarity,
             cell: self.resolution,
+            scene: Known::default(),
         })
     }
 }
@@ -133,10 +135,7 @@ impl CameraArgs {
     ///
     /// [`NoCalibration`], or what is wrong with the one there is.
     pub fn of(&self, pair: &Pair, left: &GrayImage) -> Result<(StereoCamera, Option<PathBuf>), Failure> {
-        if let (Some(focal), Some(baseline)) = (self.focal, self.baseline) {
-            check_focal(focal, left.width())?;
-            let camera = StereoCamera::rectified(left.width(), left.height(), focal, baseline);
-            camera.check()?;
+        if let Some(camera) = self.rectified(left.dimensions())? {
             return Ok((camera, None));
         }
         if let Some(path) = &self.calib {
@@ -144,6 +143,78 @@ impl CameraArgs {
         }
         let beside = pair.calibration.clone().ok_or(NoCalibration)?;
         Ok((StereoCamera::read(&beside)?, Some(beside)))
+    }
+
+    /// The calibration in the file that was named, if any was.
+    ///
+    /// # Errors
+    ///
+    /// [`NoCalibration`] if there is no other either, or what is wrong with it.
+    pub fn file(&self) -> Result<Option<(StereoCamera, &Path)>, Failure> {
+        match (&self.calib, self.focal) {
+            (Some(path), _) => Ok(Some((StereoCamera::read(path)?, path))),
+            (None, Some(_)) => Ok(None),
+            (None, None) => Err(NoCalibration.into()),
+        }
+    }
+
+    /// The cameras of a rectified pair of this size, px, if their numbers were given.
+    ///
+    /// # Errors
+    ///
+    /// If they cannot be.
+    pub fn rectified(&self, (width, height): (u32, u32)) -> Result<Option<StereoCamera>, Failure> {
+        let (Some(focal), Some(baseline)) = (self.focal, self.baseline) else { return Ok(None) };
+        check_focal(focal, width)?;
+        let camera = StereoCamera::rectified(width, height, focal, baseline);
+        camera.check()?;
+        Ok(Some(camera))
+    }
+}
+
+/// What is known of the scene.
+#[derive(Clone, Debug, clap::Args)]
+#[command(next_help_heading = "Scene")]
+pub struct SceneArgs {
+    /// The scene without the object, to be taken away: one image with both views, LEFT,RIGHT, a folder with
+    /// one pair, or `first` for the first pair; then the object is bright, whatever it was
+    #[arg(long, value_name = "FILE|first")]
+    background: Option<String>,
+    /// The part of both views to look at, px
+    #[arg(long, value_name = "X,Y,W,H")]
+    roi: Option<Region>,
+}
+
+/// The word for the first pair.
+const FIRST: &str = "first";
+
+impl SceneArgs {
+    /// Whether the first pair is the background.
+    pub fn takes_first(&self) -> bool {
+        self.background.as_deref() == Some(FIRST)
+    }
+
+    /// What is known, and noted in the choices. A background that is the first pair comes later.
+    ///
+    /// # Errors
+    ///
+    /// A [`clap::Error`] if it contradicts the choices, or if the background cannot be read.
+    pub fn scene(&self, layout: Option<Layout>, swap: bool, options: &mut Options) -> Result<Scene, Failure> {
+        if self.background.is_some() && options.polarity != Polarity::BrightObject {
+            return Err(usage("with --background the object is what is bright: leave --polarity out"));
+        }
+        let named = self.background.as_ref().filter(|_| !self.takes_first());
+        let views = named.map(|named| scene::background(named, layout)).transpose();
+        let mut views =
+            views.map_err(|error: BackgroundError| format!("no background: {}", words_of(&error)))?;
+        if let Some(views) = &mut views
+            && swap
+        {
+            views.images.reverse();
+        }
+        let scene = Scene { background: views.map(|views| views.images), region: self.roi };
+        options.scene = Known { background: self.background.is_some(), region: self.roi };
+        Ok(scene)
     }
 }
 

@@ -8,6 +8,8 @@
 //! The pair's calibration is --calib, or else calib.yaml beside the images (or in a folder above them, up
 //! to the one named). Without any, give --focal and --baseline if the pair is rectified.
 //!
+//! An object on a desk is found by --background, the same scene without it, and --roi, where it is.
+//!
 //! Two files, or one, leave their results in --out; folders and patterns leave those of each pair in a
 //! folder of its own below. There: model.ply (closed, mm, axes of the left camera), skeleton.ply,
 //! boundary.ply, report.json and pictures of every stage. What does not give a trustworthy model is
@@ -19,19 +21,22 @@
 //!   host replay both.png --layout side-by-side --calib calib.yaml --out cup
 //!   host replay recordings/ --out models --no-pictures --json > models.json
 //!   host replay 'recordings/*/left.png' --polarity dark
+//!   host replay recording/ --background first --roi 100,40,400,400
 
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
+use image::GrayImage;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 
 use super::model::{self, Model, Order};
-use super::options::{CameraArgs, MethodArgs};
+use super::options::{CameraArgs, MethodArgs, SceneArgs};
 use super::table::Table;
 use super::{Failure, batch, note, say, say_json, told, words_of};
 use crate::reconstruct::Options;
 use crate::source::find::{Found, find};
+use crate::source::scene::Scene;
 use crate::source::{Files, Layout, Pair, Views};
 
 /// Arguments of `replay`.
@@ -48,6 +53,8 @@ pub struct Args {
     swap: bool,
     #[command(flatten)]
     cameras: CameraArgs,
+    #[command(flatten)]
+    scene: SceneArgs,
     #[command(flatten)]
     method: MethodArgs,
     /// Threads, at most four a core [default: one a core]
@@ -84,9 +91,14 @@ struct Success {
 ///
 /// If there is no pair, or any is refused.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let options = args.method.options()?;
-    let found = told(args.json, pairs(args))?;
-    let done = told(args.json, all(args, &options, &found))?;
+    let mut options = args.method.options()?;
+    let one_file = args.layout.filter(|layout| *layout != Layout::Two);
+    let mut scene = told(args.json, args.scene.scene(one_file, args.swap, &mut options))?;
+    let mut found = told(args.json, pairs(args))?;
+    if args.scene.takes_first() {
+        scene.background = Some(told(args.json, first(args, &mut found))?);
+    }
+    let done = told(args.json, all(args, &options, &scene, &found))?;
     if args.json {
         say_json(&as_json(&done, &found))?;
     } else {
@@ -106,8 +118,28 @@ fn pairs(args: &Args) -> Result<Found, Failure> {
     Ok(found)
 }
 
+/// The views of the first pair, which is taken from the others.
+fn first(args: &Args, found: &mut Found) -> Result<[GrayImage; 2], Failure> {
+    if found.pairs.len() < 2 {
+        return Err(
+            "--background first needs a pair of the empty scene and pairs after it, in a folder or pattern"
+                .into(),
+        );
+    }
+    let mut images = found.pairs.remove(0).load()?.images;
+    if args.swap {
+        images.reverse();
+    }
+    Ok(images)
+}
+
 /// Every pair, in parallel; results in the order of the pairs.
-fn all<'a>(args: &Args, options: &Options, found: &'a Found) -> Result<Vec<Done<'a>>, Failure> {
+fn all<'a>(
+    args: &Args,
+    options: &Options,
+    scene: &Scene,
+    found: &'a Found,
+) -> Result<Vec<Done<'a>>, Failure> {
     let pairs = &found.pairs;
     let bar = if pairs.len() > 1 && std::io::stderr().is_terminal() {
         ProgressBar::new(pairs.len() as u64)
@@ -120,7 +152,7 @@ fn all<'a>(args: &Args, options: &Options, found: &'a Found) -> Result<Vec<Done<
     let job = |index: usize| {
         let pair = &pairs[index];
         let folder = if found.single { args.out.clone() } else { args.out.join(&pair.name) };
-        let result = one(args, options, pair, &folder).map_err(|failure| with_guess(pair, failure));
+        let result = one(args, options, scene, pair, &folder).map_err(|failure| with_guess(pair, failure));
         bar.inc(1);
         Done { pair, folder, result }
     };
@@ -129,7 +161,13 @@ fn all<'a>(args: &Args, options: &Options, found: &'a Found) -> Result<Vec<Done<
     Ok(done)
 }
 
-fn one(args: &Args, options: &Options, pair: &Pair, folder: &Path) -> Result<Success, Failure> {
+fn one(
+    args: &Args,
+    options: &Options,
+    scene: &Scene,
+    pair: &Pair,
+    folder: &Path,
+) -> Result<Success, Failure> {
     let mut views = pair.load()?;
     if args.swap {
         views.images.reverse();
@@ -137,6 +175,7 @@ fn one(args: &Args, options: &Options, pair: &Pair, folder: &Path) -> Result<Suc
     let Views { images, warnings } = views;
     let make = || {
         let (calibration, beside) = args.cameras.of(pair, &images[0])?;
+        let (images, calibration) = scene.apply(images, &calibration)?;
         let pictures = !args.no_pictures;
         let order = Order { images, calibration: &calibration, options, pictures, truth: None, folder };
         Ok((model::make(order)?, beside))

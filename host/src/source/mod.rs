@@ -1,11 +1,15 @@
-//! Where stereo pairs come from: image files, one or two a pair.
+//! Where stereo pairs come from: image files, one or two a pair, and cameras ([`v4l`]).
 //!
 //! In: what a user names, files, folders or patterns. Out: [`Pair`]s in a fixed order ([`find`]), and the
 //! grey images of each ([`Pair::load`]). A pair is two files, or one that holds both views ([`Layout`]).
+//! What a user knows about the scene is applied to both views before anything else ([`scene`]).
 
 pub mod find;
 mod names;
 pub mod picture;
+pub mod recording;
+pub mod scene;
+pub mod v4l;
 
 use std::path::{Path, PathBuf};
 
@@ -97,19 +101,27 @@ fn split(path: &Path, whole: Loaded, layout: Option<Layout>) -> Result<Views, Pi
     let Loaded { image, warnings } = whole;
     let (width, height) = image.dimensions();
     let side_by_side = layout.unwrap_or_else(|| Layout::guess(width, height)) == Layout::SideBySide;
+    let images = halves(&image, side_by_side)
+        .map_err(|length| PictureError::OddHalves { path: path.into(), length })?;
+    check_side(path, &images[0])?;
+    Ok(Views { images, warnings })
+}
+
+/// The left and the right half of an image, or the upper and the lower one. A side that cannot be halved is
+/// an error, px.
+fn halves(image: &GrayImage, side_by_side: bool) -> Result<[GrayImage; 2], u32> {
+    let (width, height) = image.dimensions();
     let length = if side_by_side { width } else { height };
     if length < 2 || length % 2 != 0 {
-        return Err(PictureError::OddHalves { path: path.into(), length });
+        return Err(length);
     }
     let half = length / 2;
     let part = |second: u32| {
         let (x, y, w, h) =
             if side_by_side { (second * half, 0, half, height) } else { (0, second * half, width, half) };
-        image::imageops::crop_imm(&image, x, y, w, h).to_image()
+        image::imageops::crop_imm(image, x, y, w, h).to_image()
     };
-    let images = [part(0), part(1)];
-    check_side(path, &images[0])?;
-    Ok(Views { images, warnings })
+    Ok([part(0), part(1)])
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use super::super::{Run, words};
 use crate::calibration::Camera;
 use crate::reconstruct::{Mode, Pieces, Profile, Radius, Skeleton, settings};
+use crate::source::scene::Region;
 use crate::stage::balls::px;
 use serde::Serialize;
 use shared::fixed::ONE;
@@ -41,6 +42,10 @@ pub(super) struct Choices {
     curve_end_weight: i32,
     /// Grid spacing of the mesh, if it was given.
     cell_mm: Option<f64>,
+    /// Whether the images are differences to an empty scene.
+    background_taken_away: bool,
+    /// The part of the images that was looked at, if not all.
+    region_px: Option<Region>,
 }
 
 impl Choices {
@@ -82,6 +87,8 @@ impl Choices {
             curve_smoothing: share(chosen.curves.smoothing),
             curve_end_weight: chosen.curves.end_weight,
             cell_mm: run.options.cell,
+            background_taken_away: run.options.scene.background,
+            region_px: run.options.scene.region,
         }
     }
 }

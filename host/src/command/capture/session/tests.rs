@@ -1,0 +1,163 @@
+//! Whole runs on a simulated camera: what is modelled, recorded and told.
+
+use super::*;
+use crate::command::replay;
+use crate::render::render;
+use crate::shape::Shape;
+use crate::source::v4l::format::{Format, FourCc};
+use crate::source::v4l::layout::Layout;
+use crate::source::v4l::simulated::{Event, Simulated};
+use crate::view::Calibrated;
+use clap::Parser;
+use std::fs;
+use std::path::Path;
+
+#[derive(Parser)]
+struct Line {
+    #[command(flatten)]
+    args: Args,
+}
+
+#[derive(Parser)]
+struct ReplayLine {
+    #[command(flatten)]
+    args: replay::Args,
+}
+
+fn calibration() -> StereoCamera {
+    StereoCamera::rectified(320, 240, 375.0, 60.0)
+}
+
+/// A frame with both eyes side by side, padded by 16 bytes a row, darkened by a factor.
+fn both_eyes(share: u32) -> Vec<u8> {
+    let views = render(&Shape::Capsule.mesh(4.0), &Calibrated::pair(&calibration()));
+    let mut bytes = Vec::new();
+    for v in 0..240 {
+        for view in &views {
+            bytes.extend((0..320).map(|u| (u32::from(view[(u, v)].0[0]) / share) as u8));
+        }
+        bytes.extend([0xee; 16]);
+    }
+    bytes
+}
+
+fn empty() -> Vec<u8> {
+    vec![3; 656 * 240]
+}
+
+fn rig(script: Vec<Event>) -> Rig<Simulated> {
+    let format = Format { code: FourCc(*b"GREY"), width: 640, height: 240, stride: 656 };
+    let mut camera = Simulated::new("/dev/video0", format, script);
+    // Slower than a model, so that none is dropped.
+    camera.pace = Duration::from_millis(1500);
+    let optics = Optics { formats: vec![format], layout: Layout::SideBySide, swap: false };
+    Rig { pairs: Pairs::of(camera, None), optics, calibration: calibration(), file: None }
+}
+
+/// Runs `capture` on what a camera sends; the folder is made to be the results' and the recording's.
+fn capture(folder: &Path, script: Vec<Vec<u8>>, more: &[&str]) -> Result<(), String> {
+    let [out, record] = ["models", "recording"].map(|name| folder.join(name).display().to_string());
+    let fixed =
+        ["capture", "--device", "x", "--no-pictures", "--skip", "0", "--out", &out, "--record", &record];
+    let Line { args } = Line::try_parse_from(fixed.iter().chain(more)).unwrap();
+    let mut options = args.method.options().unwrap();
+    let scene = args.scene.scene(None, false, &mut options).unwrap();
+    let rig =
+        rig(script.into_iter().enumerate().map(|(n, bytes)| Event::Frame(40 * n as u64, bytes)).collect());
+    let session = Session::begin(&args, &options, scene, &rig).unwrap();
+    session.run(rig, &AtomicBool::new(false)).map_err(|failure| words_of(&*failure))
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let entries =
+        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let mut names: Vec<_> = entries.collect();
+    names.sort();
+    names
+}
+
+/// The bytes of a result, but for its times.
+fn result(folder: &Path) -> [Vec<u8>; 3] {
+    let mut report: Value = serde_json::from_slice(&fs::read(folder.join("report.json")).unwrap()).unwrap();
+    report.as_object_mut().unwrap().remove("times_ms");
+    let [model, skeleton] = ["model.ply", "skeleton.ply"].map(|name| fs::read(folder.join(name)).unwrap());
+    [model, skeleton, report.to_string().into_bytes()]
+}
+
+fn replay_of(folder: &Path, more: &[&str]) -> Result<(), Failure> {
+    let [recording, again] = ["recording", "again"].map(|name| folder.join(name).display().to_string());
+    let fixed = ["replay", &recording, "--out", &again, "--no-pictures"];
+    replay::run(&ReplayLine::try_parse_from(fixed.iter().chain(more)).unwrap().args)
+}
+
+#[test]
+fn a_recording_gives_the_same_models_byte_by_byte() {
+    let folder = tempfile::tempdir().unwrap();
+    let script = vec![both_eyes(1), both_eyes(2), both_eyes(1)];
+    capture(folder.path(), script, &["--focal", "375", "--baseline", "60", "--frames", "2"]).unwrap();
+    assert_eq!(names(&folder.path().join("models")), ["000001", "000002"]);
+    let files = ["calib.yaml", "left_000001.png", "left_000002.png", "right_000001.png", "right_000002.png"];
+    assert_eq!(names(&folder.path().join("recording")), files);
+    replay_of(folder.path(), &[]).unwrap();
+    for name in ["000001", "000002"] {
+        let [live, again] = ["models", "again"].map(|way| result(&folder.path().join(way).join(name)));
+        assert!(live == again, "{name}");
+    }
+}
+
+#[test]
+fn the_first_pair_can_be_the_background_and_is_again_in_the_recording() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = ["--background", "first", "--roi", "10,4,300,230"];
+    let more = [&["--focal", "375", "--baseline", "60", "--frames", "2"][..], &scene].concat();
+    // The second pair still shows the empty scene, and is refused.
+    capture(folder.path(), vec![empty(), empty(), both_eyes(1), empty()], &more).unwrap();
+    assert_eq!(names(&folder.path().join("models")), ["000002"]);
+    let report = fs::read(folder.path().join("models/000002/report.json")).unwrap();
+    let report: Value = serde_json::from_slice(&report).unwrap();
+    assert_eq!(report["options"]["background_taken_away"], true);
+    assert_eq!(report["options"]["region_px"]["width"], 300);
+    let [recording, again] =
+        ["recording", "again"].map(|name| folder.path().join(name).display().to_string());
+    let line = [&["replay", &recording, "--out", &again, "--no-pictures"][..], &scene].concat();
+    // One of its two pairs is refused again.
+    assert!(replay::run(&ReplayLine::try_parse_from(line).unwrap().args).is_err());
+    let [live, again] = ["models", "again"].map(|way| result(&folder.path().join(way).join("000002")));
+    assert!(live == again);
+}
+
+#[test]
+fn the_best_of_a_burst_is_one_model() {
+    let folder = tempfile::tempdir().unwrap();
+    let more = ["--focal", "375", "--baseline", "60", "--frames", "3", "--best"];
+    // A second, smaller thing in the picture is a warning.
+    let mut worse = both_eyes(1);
+    for row in worse.chunks_mut(656).take(45).skip(5) {
+        row[5..65].fill(255);
+        row[325..385].fill(255);
+    }
+    capture(folder.path(), vec![worse, both_eyes(1), empty(), empty()], &more).unwrap();
+    let files = ["boundary.ply", "model.ply", "report.json", "skeleton.ply"];
+    assert_eq!(names(&folder.path().join("models")), files);
+    assert!(replay_of(folder.path(), &[]).is_err(), "the third pair is empty");
+    assert!(result(&folder.path().join("models")) == result(&folder.path().join("again/000002")));
+}
+
+#[test]
+fn a_camera_pulled_out_leaves_what_was_made_and_fails() {
+    let folder = tempfile::tempdir().unwrap();
+    let more = ["--focal", "375", "--baseline", "60"];
+    let error = capture(folder.path(), vec![both_eyes(1)], &more).unwrap_err();
+    assert!(error.contains("unplugged"), "{error}");
+    assert_eq!(names(&folder.path().join("models/000001")).len(), 4);
+    assert_eq!(names(&folder.path().join("recording")).len(), 3);
+}
+
+#[test]
+fn nothing_but_refusals_is_a_failure_with_the_last() {
+    let folder = tempfile::tempdir().unwrap();
+    let more = ["--focal", "375", "--baseline", "60", "--frames", "2"];
+    let error = capture(folder.path(), vec![empty(); 3], &more).unwrap_err();
+    assert!(error.contains("none of 2 pairs gave a model") && error.contains("no object"), "{error}");
+    assert!(!folder.path().join("models").exists());
+}

@@ -1,0 +1,162 @@
+//! The cameras of this machine: what `host capture --device` takes.
+//!
+//! For each: its device, name, bus and driver; the formats, sizes and rates that it offers; and what
+//! `host capture` would take if nothing else were said. Nodes that take no pictures, such as the metadata node
+//! of every USB camera, are left out.
+//!
+//! Examples:
+//!   host list-devices
+//!   host list-devices --json
+
+use serde_json::{Value, json};
+
+use super::table::Table;
+use super::{Failure, say, say_json, words_of};
+use crate::source::v4l::choose::{Camera, Choice, Offer, Request, Sizes, choose, sizes_in_words};
+use crate::source::v4l::errors::CameraError;
+use crate::source::v4l::format::PixelFormat;
+use crate::source::v4l::kernel;
+
+/// Arguments of `list-devices`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Print one JSON document instead of text
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
+/// A camera, or why it cannot be asked.
+type Found = Result<Camera, CameraError>;
+
+/// Lists them.
+///
+/// # Errors
+///
+/// If the system has no such devices at all.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    let cameras = kernel::list()?;
+    if args.json {
+        return say_json(&json!({ "cameras": cameras.iter().map(camera_as_json).collect::<Vec<_>>() }));
+    }
+    say(&cameras_as_text(&cameras))
+}
+
+fn cameras_as_text(cameras: &[Found]) -> String {
+    if cameras.is_empty() {
+        return "no camera: plug one in; in a container or a virtual machine, pass its /dev/video nodes on\n"
+            .into();
+    }
+    cameras.iter().map(camera_as_text).collect()
+}
+
+fn camera_as_text(camera: &Found) -> String {
+    let camera = match camera {
+        Ok(camera) => camera,
+        Err(error) => return format!("{}\n", words_of(error)),
+    };
+    let mut table = Table::new(&camera.path.display().to_string());
+    table.row("name", &camera.name);
+    table.row("bus", &format!("{}, driver {}", camera.bus, camera.driver));
+    for offer in &camera.offers {
+        let what = if offer.name.is_empty() { String::new() } else { format!(" ({})", offer.name) };
+        let use_of = if PixelFormat::of(offer.code).is_some() { "" } else { ", not read" };
+        table.row("format", &format!("{}{what}{use_of}", offer.code));
+        for sizes in &offer.sizes {
+            table.row("", &sizes_in_words(sizes));
+        }
+    }
+    match choose(camera, &Request::default()) {
+        Ok(choice) => table.row("taken", &choice_in_words(&choice)),
+        Err(_) => table.row("taken", "as one view: give two cameras, or say --layout"),
+    }
+    table.text().to_owned()
+}
+
+fn choice_in_words(choice: &Choice) -> String {
+    let (width, height) = choice.size;
+    let rate = choice.rate.map_or_else(String::new, |rate| format!(" at {rate:.0}/s"));
+    format!("{} {width}x{height}{rate}, {}, unless you say otherwise", choice.code, choice.layout.name())
+}
+
+fn camera_as_json(camera: &Found) -> Value {
+    let camera = match camera {
+        Ok(camera) => camera,
+        Err(error) => return json!({ "error": words_of(error) }),
+    };
+    let sizes = |sizes: &Sizes| match sizes {
+        Sizes::One((width, height), rates) => {
+            json!({ "size_px": [width, height], "rates_per_s": rates })
+        }
+        Sizes::Range { least, most, step } => {
+            json!({ "least_px": least, "most_px": most, "step_px": step })
+        }
+    };
+    let offer = |offer: &Offer| {
+        json!({
+            "code": offer.code.to_string(),
+            "name": offer.name,
+            "is_read": PixelFormat::of(offer.code).is_some(),
+            "sizes": offer.sizes.iter().map(sizes).collect::<Vec<_>>(),
+        })
+    };
+    let taken = choose(camera, &Request::default()).ok().map(|choice| {
+        json!({
+            "code": choice.code.to_string(),
+            "size_px": choice.size,
+            "rate_per_s": choice.rate,
+            "layout": choice.layout.name(),
+        })
+    });
+    json!({
+        "device": camera.path,
+        "name": camera.name,
+        "bus": camera.bus,
+        "driver": camera.driver,
+        "formats": camera.offers.iter().map(offer).collect::<Vec<_>>(),
+        "taken": taken,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::source::v4l::errors::{Doing, errno};
+
+    #[test]
+    fn cameras_are_told_with_what_would_be_taken() {
+        let camera = Camera {
+            path: "/dev/video0".into(),
+            name: "3D USB Camera".into(),
+            driver: "uvcvideo".into(),
+            bus: "usb-0000:00:14.0-1".into(),
+            offers: vec![
+                Offer {
+                    code: "YUYV".parse().unwrap(),
+                    name: "YUYV 4:2:2".into(),
+                    sizes: vec![Sizes::One((1280, 480), vec![30.0, 29.97])],
+                },
+                Offer { code: "H264".parse().unwrap(), name: String::new(), sizes: Vec::new() },
+            ],
+            current: ("YUYV".parse().unwrap(), (1280, 480)),
+        };
+        let busy =
+            CameraError::System { path: "/dev/video2".into(), doing: Doing::Open, code: errno::EACCES };
+        let cameras = [Ok(camera), Err(busy)];
+        let text = cameras_as_text(&cameras);
+        for words in [
+            "/dev/video0\n",
+            "3D USB Camera",
+            "YUYV (YUYV 4:2:2)",
+            "1280x480 at 30, 29.97/s",
+            "H264, not read",
+            "YUYV 1280x480 at 30/s, side-by-side",
+            "/dev/video2 cannot be opened: you may not use it",
+        ] {
+            assert!(text.contains(words), "{words} is not in\n{text}");
+        }
+        let told = camera_as_json(&cameras[0]);
+        assert_eq!(told["taken"]["layout"], "side-by-side");
+        assert_eq!(told["formats"][1]["is_read"], false);
+        assert!(cameras_as_text(&[]).contains("plug one in"));
+    }
+}
