@@ -25,12 +25,13 @@ fn bad(args: &[&str], code: i32) -> String {
 
 #[test]
 fn wrong_usage_is_2() {
-    let wrong: [&[&str]; 15] = [
+    let wrong: [&[&str]; 19] = [
         &["capture"],
         &["capture", "--device"],
         &["capture", "--device", "a", "--device", "b", "--device", "c", "--calib", "c"],
         &["capture", "--device", "a", "--layout", "two", "--calib", "c"],
         &["capture", "--device", "a", "--layout", "beside"],
+        &["capture", "--device", "a", "--device", "a", "--calib", "c"],
         &["capture", "--device", "a", "--device", "b", "--layout", "side-by-side"],
         &["capture", "--device", "a", "--format", "MJPEG"],
         &["capture", "--device", "a", "--size", "640"],
@@ -40,6 +41,9 @@ fn wrong_usage_is_2() {
         &["capture", "--device", "a", "--frames", "3", "--seconds", "3"],
         &["capture", "--device", "a", "--roi", "1,2,3"],
         &["capture", "--device", "a", "--background", "b", "--polarity", "dark"],
+        &["capture", "--device", "a", "--only-record"],
+        &["capture", "--device", "a", "--only-record", "--record", "b", "--best"],
+        &["calibrate", "--calib", "a"],
         &["list-devices", "all"],
     ];
     for args in wrong {

@@ -12,7 +12,7 @@
 //!
 //! --best makes one model, of the pair of a burst with the fewest warnings and then the smallest part of the
 //! outline without counterpart. --record keeps every pair that was worked on; `host replay` makes the same
-//! models of it, byte for byte. --background first takes the first pair for the scene without the object.
+//! models of it, byte for byte; with --only-record it makes none, and needs no calibration. --background first takes the first pair for the scene without the object.
 //!
 //! Succeeds if any pair gave a model and the camera did not fail. docs/capture.md tells more.
 //!
@@ -21,8 +21,10 @@
 //!   host capture --device /dev/video0 --focal 700 --baseline 60 --frames 20 --best --out cup
 //!   host capture --device /dev/video0 --device /dev/video2 --format MJPG --fps 15 --calib calib.yaml
 //!   host capture --device /dev/video0 --calib calib.yaml --background first --record session --seconds 30
+//!   host capture --device /dev/video0 --record board --only-record --fps 5
 
 mod session;
+mod telling;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -93,6 +95,9 @@ pub struct Args {
     /// Folder that keeps the pairs, new or empty
     #[arg(long, value_name = "DIR")]
     record: Option<PathBuf>,
+    /// Make no models
+    #[arg(long, requires = "record", conflicts_with_all = ["best", "background", "roi"])]
+    only_record: bool,
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "ossature-capture")]
     out: PathBuf,
@@ -139,6 +144,11 @@ impl Eyes {
 /// A [`clap::Error`] for wrong usage; if a camera fails, results cannot be written, or no pair gave a model.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let layout = args.layout.layout(args.device.len())?;
+    if let [left, right] = args.device.as_slice()
+        && left == right
+    {
+        return Err(usage("both devices are the same camera: give two, or one that sees with both eyes"));
+    }
     let mut options = args.method.options()?;
     let prepared = told(args.json, {
         let scene = args.scene.scene(None, args.swap, &mut options);
@@ -151,7 +161,10 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 
 /// Opens the cameras and sets them as the calibration and the user say.
 fn open(args: &Args, layout: Option<Layout>) -> Result<Rig<Kernel>, Failure> {
-    let file = args.cameras.file()?;
+    let file = match args.cameras.file() {
+        Err(failure) if args.only_record && failure.is::<NoCalibration>() => None,
+        file => file?,
+    };
     let camera = |eye: usize, path: &Path| {
         let view = file.map(|(pair, _)| if eye == 0 { pair.left } else { pair.right });
         let request = Request {
@@ -176,8 +189,8 @@ fn open(args: &Args, layout: Option<Layout>) -> Result<Rig<Kernel>, Failure> {
         return Err(CameraError::Sizes { left: view, right: right.size }.into());
     }
     let calibration = match file {
-        Some((camera, _)) => camera,
-        None => args.cameras.rectified(view)?.ok_or(NoCalibration)?,
+        Some((camera, _)) => Some(camera),
+        None => args.cameras.rectified(view)?,
     };
     let second = second.map(|(kernel, _)| kernel);
     let file = file.map(|(_, path)| path.to_path_buf());

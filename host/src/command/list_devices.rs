@@ -14,7 +14,6 @@ use super::table::Table;
 use super::{Failure, say, say_json, words_of};
 use crate::source::v4l::choose::{Camera, Choice, Offer, Request, Sizes, choose, sizes_in_words};
 use crate::source::v4l::errors::CameraError;
-use crate::source::v4l::format::PixelFormat;
 use crate::source::v4l::kernel;
 
 /// Arguments of `list-devices`.
@@ -57,13 +56,17 @@ fn camera_as_text(camera: &Found) -> String {
     let mut table = Table::new(&camera.path.display().to_string());
     table.row("name", &camera.name);
     table.row("bus", &format!("{}, driver {}", camera.bus, camera.driver));
-    for offer in &camera.offers {
+    let (read, others): (Vec<&Offer>, Vec<_>) = camera.offers.iter().partition(|offer| offer.is_read());
+    for offer in read {
         let what = if offer.name.is_empty() { String::new() } else { format!(" ({})", offer.name) };
-        let use_of = if PixelFormat::of(offer.code).is_some() { "" } else { ", not read" };
-        table.row("format", &format!("{}{what}{use_of}", offer.code));
+        table.row("format", &format!("{}{what}", offer.code));
         for sizes in &offer.sizes {
             table.row("", &sizes_in_words(sizes));
         }
+    }
+    if !others.is_empty() {
+        let codes: Vec<String> = others.iter().map(|offer| offer.code.to_string()).collect();
+        table.row("not read", &codes.join(", "));
     }
     match choose(camera, &Request::default()) {
         Ok(choice) => table.row("taken", &choice_in_words(&choice)),
@@ -95,7 +98,7 @@ fn camera_as_json(camera: &Found) -> Value {
         json!({
             "code": offer.code.to_string(),
             "name": offer.name,
-            "is_read": PixelFormat::of(offer.code).is_some(),
+            "is_read": offer.is_read(),
             "sizes": offer.sizes.iter().map(sizes).collect::<Vec<_>>(),
         })
     };
@@ -148,7 +151,7 @@ mod tests {
             "3D USB Camera",
             "YUYV (YUYV 4:2:2)",
             "1280x480 at 30, 29.97/s",
-            "H264, not read",
+            "not read      H264",
             "YUYV 1280x480 at 30/s, side-by-side",
             "/dev/video2 cannot be opened: you may not use it",
         ] {

@@ -14,6 +14,7 @@
 //!
 //! Exit codes: 0 done, 1 refused or failed, 2 wrong usage.
 
+pub mod calibrate;
 pub mod capture;
 pub mod completions;
 pub mod demo;
@@ -62,6 +63,9 @@ enum Command {
     /// Cameras that are plugged in
     #[command(long_about = page(include_str!("list_devices.rs")))]
     ListDevices(list_devices::Args),
+    /// Whether a calibration is right
+    #[command(long_about = page(include_str!("calibrate.rs")))]
+    Calibrate(calibrate::Args),
     /// A model from a built-in pair, held against the truth
     #[command(long_about = page(include_str!("demo.rs")))]
     Demo(demo::Args),
@@ -93,6 +97,7 @@ impl Cli {
             Command::Replay(args) => replay::run(args),
             Command::Capture(args) => capture::run(args),
             Command::ListDevices(args) => told(args.json, list_devices::run(args)),
+            Command::Calibrate(args) => told(args.json, calibrate::run(args)),
             Command::Demo(args) => told(args.json, demo::run(args)),
             Command::Render(args) => render::run(args),
             Command::Evaluate(args) => told(args.json, evaluate::run(args)),

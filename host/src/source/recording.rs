@@ -42,33 +42,27 @@ pub enum RecordError {
 #[derive(Clone, Debug)]
 pub struct Recording {
     folder: PathBuf,
+    /// What is written before the first pair: a calibration, and the file that it comes from.
+    calibration: Option<(StereoCamera, Option<PathBuf>)>,
 }
 
 impl Recording {
-    /// Begins a recording. A calibration that OpenCV's file cannot hold (fisheye lenses, eyes of two sizes)
-    /// is copied from `file`, a Kalibr camchain.
+    /// Sees that the folder is new or empty; it is made with the first pair. A calibration that OpenCV's file
+    /// cannot hold (fisheye lenses, eyes of two sizes) is copied from its file, a Kalibr camchain.
     ///
     /// # Errors
     ///
     /// See [`RecordError`].
     pub fn begin(
         folder: &Path,
-        calibration: &StereoCamera,
-        file: Option<&Path>,
+        calibration: Option<(StereoCamera, Option<PathBuf>)>,
     ) -> Result<Self, RecordError> {
-        let failed = |source| RecordError::Folder { path: folder.into(), source };
-        std::fs::create_dir_all(folder).map_err(failed)?;
-        if std::fs::read_dir(folder).map_err(failed)?.next().is_some() {
-            return Err(RecordError::NotEmpty { path: folder.into() });
+        let path = || folder.to_path_buf();
+        let failed = |source| RecordError::Folder { path: path(), source };
+        if folder.exists() && std::fs::read_dir(folder).map_err(failed)?.next().is_some() {
+            return Err(RecordError::NotEmpty { path: path() });
         }
-        match (calibration.write_opencv_yaml(folder.join("calib.yaml")), file) {
-            (Err(CalibrationError::Inexpressible { .. }), Some(file)) if file.is_file() => {
-                let bytes = std::fs::read(file).map_err(failed)?;
-                write_together(&[(&folder.join("camchain.yaml"), bytes)])?;
-            }
-            (result, _) => result?,
-        }
-        Ok(Self { folder: folder.into() })
+        Ok(Self { folder: path(), calibration })
     }
 
     /// Adds a pair.
@@ -76,18 +70,31 @@ impl Recording {
     /// # Errors
     ///
     /// See [`RecordError`].
-    pub fn add(&self, number: u64, views: &[GrayImage; 2]) -> Result<(), RecordError> {
+    pub fn add(&mut self, number: u64, views: &[GrayImage; 2]) -> Result<(), RecordError> {
+        let failed = |source| RecordError::Folder { path: self.folder.clone(), source };
+        std::fs::create_dir_all(&self.folder).map_err(failed)?;
+        if let Some((calibration, file)) = &self.calibration {
+            match (calibration.write_opencv_yaml(self.folder.join("calib.yaml")), file) {
+                (Err(CalibrationError::Inexpressible { .. }), Some(file)) if file.is_file() => {
+                    let bytes = std::fs::read(file).map_err(failed)?;
+                    write_together(&[(&self.folder.join("camchain.yaml"), bytes)])?;
+                }
+                (result, _) => result?,
+            }
+            self.calibration = None;
+        }
         let [left, right] = ["left", "right"].map(|eye| self.folder.join(format!("{eye}_{number:06}.png")));
-        let bytes = |view: &GrayImage, path: &Path| {
-            let mut bytes = Cursor::new(Vec::new());
-            view.write_to(&mut bytes, ImageFormat::Png)
-                .map_err(|error| ExportError::Io { path: path.into(), source: io::Error::other(error) })?;
-            Ok::<_, ExportError>(bytes.into_inner())
-        };
-        let files =
-            [(left.as_path(), bytes(&views[0], &left)?), (right.as_path(), bytes(&views[1], &right)?)];
+        let files = [(left.as_path(), png(&views[0], &left)?), (right.as_path(), png(&views[1], &right)?)];
         Ok(write_together(&files)?)
     }
+}
+
+/// A view as a file of this name.
+fn png(view: &GrayImage, path: &Path) -> Result<Vec<u8>, ExportError> {
+    let mut bytes = Cursor::new(Vec::new());
+    let written = view.write_to(&mut bytes, ImageFormat::Png);
+    written.map_err(|error| ExportError::Io { path: path.into(), source: io::Error::other(error) })?;
+    Ok(bytes.into_inner())
 }
 
 #[cfg(test)]
@@ -97,11 +104,28 @@ mod tests {
     use image::Luma;
 
     #[test]
+    fn a_calibration_that_is_no_opencv_file_is_copied() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut camera = StereoCamera::rectified(5, 3, 4.0, 60.0);
+        camera.right.width = 6;
+        let file = folder.path().join("mine.yaml");
+        std::fs::write(&file, "cam0: {}").unwrap();
+        let to = folder.path().join("recording");
+        let mut recording = Recording::begin(&to, Some((camera, Some(file)))).unwrap();
+        recording.add(1, &[GrayImage::new(5, 3), GrayImage::new(6, 3)]).unwrap();
+        assert_eq!(std::fs::read(to.join("camchain.yaml")).unwrap(), b"cam0: {}");
+        assert!(!to.join("calib.yaml").exists());
+        let none = Recording::begin(&folder.path().join("none"), Some((camera, None))).unwrap();
+        assert!(none.clone().add(1, &[GrayImage::new(5, 3), GrayImage::new(6, 3)]).is_err());
+    }
+
+    #[test]
     fn what_is_recorded_is_found_again_bit_by_bit() {
         let parent = tempfile::tempdir().unwrap();
         let folder = parent.path().join("new/recording");
         let camera = StereoCamera::rectified(5, 3, 4.0, 60.0);
-        let recording = Recording::begin(&folder, &camera, None).unwrap();
+        let mut recording = Recording::begin(&folder, Some((camera, None))).unwrap();
+        assert!(!folder.exists());
         let view = |number: u64, eye: u32| {
             GrayImage::from_fn(5, 3, |u, v| Luma([(number as u32 * 50 + eye * 20 + u + 5 * v) as u8]))
         };
@@ -115,7 +139,10 @@ mod tests {
             assert_eq!(pair.load().unwrap().images, [view(number, 0), view(number, 1)]);
             assert_eq!(StereoCamera::read(pair.calibration.as_ref().unwrap()).unwrap(), camera);
         }
-        let error = Recording::begin(&folder, &camera, None).unwrap_err().to_string();
+        let error = Recording::begin(&folder, Some((camera, None))).unwrap_err().to_string();
         assert!(error.contains("not empty"), "{error}");
+        let board = parent.path().join("board");
+        Recording::begin(&board, None).unwrap().add(1, &[view(1, 0), view(1, 1)]).unwrap();
+        assert_eq!(std::fs::read_dir(board).unwrap().count(), 2);
     }
 }

@@ -211,7 +211,7 @@ mod tests {
     }
 
     /// Size and middle of the model, mm.
-    fn model(views: [GrayImage; 2], camera: &StereoCamera) -> [f64; 6] {
+    fn model(views: &[GrayImage; 2], camera: &StereoCamera) -> [f64; 6] {
         let made =
             reconstruct(views[0].clone(), views[1].clone(), camera, &Options::default(), &mut ()).unwrap();
         let [low, high] = made.mesh.bounds().unwrap();
@@ -227,7 +227,7 @@ mod tests {
 
     #[test]
     fn an_object_on_a_desk_is_found_by_what_it_hides() {
-        let plain = model(capsule(), &camera());
+        let plain = model(&capsule(), &camera());
         // A desk with stripes, a bright half and, at the side, paper as bright as the object.
         let desk = GrayImage::from_fn(320, 240, |u, v| {
             let paper = u > 250;
@@ -247,13 +247,13 @@ mod tests {
         assert!(bare.as_ref().is_err() || bare.as_ref().is_ok_and(far), "the desk alone must not do");
         let scene = Scene { background: Some([desk.clone(), desk.clone()]), region: None };
         let (cleared, calibration) = scene.apply(views, &camera()).unwrap();
-        assert_near(model(cleared, &calibration), plain, 2.0);
+        assert_near(model(&cleared, &calibration), plain, 2.0);
     }
 
     #[test]
     fn a_region_leaves_the_model_where_it_is() {
         let mut views = capsule();
-        let plain = model(capsule(), &camera());
+        let plain = model(&capsule(), &camera());
         // Something else, much larger, at the side.
         for view in &mut views {
             for v in 0..240 {
@@ -265,7 +265,7 @@ mod tests {
         let scene = Scene { background: None, region: Some("64,2,250,234".parse().unwrap()) };
         let (cut, calibration) = scene.apply(views, &camera()).unwrap();
         assert_eq!(cut[0].dimensions(), (250, 234));
-        assert_near(model(cut, &calibration), plain, 0.2);
+        assert_near(model(&cut, &calibration), plain, 0.2);
     }
 
     #[test]

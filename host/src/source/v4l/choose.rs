@@ -49,6 +49,14 @@ pub struct Offer {
     pub sizes: Vec<Sizes>,
 }
 
+impl Offer {
+    /// Whether its frames become grey values.
+    #[must_use]
+    pub fn is_read(&self) -> bool {
+        PixelFormat::of(self.code).is_some()
+    }
+}
+
 /// Sizes, and how many frames a second they can be had at; no rates if the driver does not list them.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Sizes {
@@ -109,12 +117,10 @@ struct Mode {
 pub fn choose(camera: &Camera, request: &Request) -> Result<Choice, CameraError> {
     let refused =
         |what: String| CameraError::NotOffered { path: camera.path.clone(), what, offers: offers(camera) };
-    let readable = |offer: &&Offer| PixelFormat::of(offer.code).is_some();
-    let known: Vec<&Offer> = camera.offers.iter().filter(readable).collect();
-    if known.is_empty() {
+    let mut offers: Vec<&Offer> = camera.offers.iter().filter(|offer| offer.is_read()).collect();
+    if offers.is_empty() {
         return Err(refused("has no pixel format that is read".into()));
     }
-    let mut offers: Vec<&Offer> = known;
     if let Some(code) = request.code {
         offers.retain(|offer| offer.code == code);
         if offers.is_empty() {
@@ -202,20 +208,24 @@ fn worth(choice: &Choice) -> impl PartialOrd {
     (rate >= SWIFT, u64::from(width) * u64::from(height), std::cmp::Reverse(cost), rate)
 }
 
-/// What a camera offers, in a few words.
+/// What a camera offers that is read, in a few words.
 #[must_use]
 pub fn offers(camera: &Camera) -> String {
+    let read: Vec<&Offer> = camera.offers.iter().filter(|offer| offer.is_read()).collect();
     let mut words: Vec<String> = Vec::new();
-    for offer in &camera.offers {
-        if offer.sizes.is_empty() {
-            words.push(format!("{} (now {}x{})", offer.code, camera.current.1.0, camera.current.1.1));
+    // Formats that come in the same sizes are told together.
+    for alike in read.chunk_by(|a, b| a.sizes == b.sizes) {
+        let codes = alike.iter().map(|offer| offer.code.to_string()).collect::<Vec<_>>().join(" or ");
+        let sizes = &alike[0].sizes;
+        if sizes.is_empty() {
+            words.push(format!("{codes} (now {}x{})", camera.current.1.0, camera.current.1.1));
         }
-        words.extend(offer.sizes.iter().map(|sizes| format!("{} {}", offer.code, sizes_in_words(sizes))));
+        words.extend(sizes.iter().map(|sizes| format!("{codes} {}", sizes_in_words(sizes))));
     }
     let more = words.len().saturating_sub(LISTED);
     words.truncate(LISTED);
     match (words.is_empty(), more) {
-        (true, _) => "nothing".into(),
+        (true, _) => "nothing that is read".into(),
         (false, 0) => words.join(", "),
         (false, _) => format!("{} and {more} more", words.join(", ")),
     }

@@ -33,7 +33,8 @@ impl Doing {
     }
 }
 
-/// Numbers of the system's errors that a camera gives, as Linux has them on every machine.
+/// Numbers of the system's errors that a camera gives, as Linux has them on all machines with cameras: x86, ARM,
+/// RISC-V.
 pub mod errno {
     /// Not permitted.
     pub const EPERM: i32 = 1;

@@ -31,7 +31,11 @@ pub struct FourCc(pub [u8; 4]);
 
 impl fmt::Display for FourCc {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(out, "{}", String::from_utf8_lossy(&self.0).trim_end())
+        // The kernel marks big-endian values by the highest bit of the last character.
+        let [a, b, c, d] = self.0;
+        let plain = [a, b, c, d & 0x7f];
+        write!(out, "{}", String::from_utf8_lossy(&plain).trim_end())?;
+        if d == d & 0x7f { Ok(()) } else { out.write_str("-BE") }
     }
 }
 

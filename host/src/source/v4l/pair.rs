@@ -152,7 +152,7 @@ mod tests {
     use super::super::simulated::{Event, Simulated};
     use super::*;
 
-    const GO: AtomicBool = AtomicBool::new(false);
+    static GO: AtomicBool = AtomicBool::new(false);
 
     fn eye(path: &str, times: &[u64]) -> Simulated {
         let frames = times.iter().enumerate().map(|(number, ms)| Event::frame(*ms, number as u8));

@@ -9,6 +9,7 @@ use crate::source::v4l::layout::Layout;
 use crate::source::v4l::simulated::{Event, Simulated};
 use crate::view::Calibrated;
 use clap::Parser;
+use serde_json::Value;
 use std::fs;
 use std::path::Path;
 
@@ -51,7 +52,7 @@ fn rig(script: Vec<Event>) -> Rig<Simulated> {
     // Slower than a model, so that none is dropped.
     camera.pace = Duration::from_millis(1500);
     let optics = Optics { formats: vec![format], layout: Layout::SideBySide, swap: false };
-    Rig { pairs: Pairs::of(camera, None), optics, calibration: calibration(), file: None }
+    Rig { pairs: Pairs::of(camera, None), optics, calibration: Some(calibration()), file: None }
 }
 
 /// Runs `capture` on what a camera sends; the folder is made to be the results' and the recording's.
@@ -141,6 +142,14 @@ fn the_best_of_a_burst_is_one_model() {
     assert_eq!(names(&folder.path().join("models")), files);
     assert!(replay_of(folder.path(), &[]).is_err(), "the third pair is empty");
     assert!(result(&folder.path().join("models")) == result(&folder.path().join("again/000002")));
+}
+
+#[test]
+fn recording_alone_makes_no_model() {
+    let folder = tempfile::tempdir().unwrap();
+    capture(folder.path(), vec![empty(), empty()], &["--only-record", "--frames", "1"]).unwrap();
+    assert_eq!(names(folder.path()), ["recording"]);
+    assert_eq!(names(&folder.path().join("recording")).len(), 3);
 }
 
 #[test]
