@@ -1,7 +1,6 @@
 # What is done to `host capture` in the machine. Each scenario leaves in /out/NAME what was printed (`out.json`
-# and `err`), the exit code (`code`), the seconds at which the driver was told to fail (`begin`) and it ended (`end`), and
-# the files that were written.
-# What all that has to be is asserted in tests/tests/v4l2.rs, outside.
+# and `err`), the exit code (`code`), the second at which the driver was told to fail (`begin`) and that at which
+# all was over (`end`), and the files that were written. What that has to be, tests/tests/v4l2.rs asserts outside.
 #
 # Camera 0 gives what node 1 is shown, camera 2 what node 3 is.
 
@@ -53,7 +52,8 @@ gives() {
     cmp -s /tmp/frame "$3"
 }
 
-# feed CAMERA WIDTHxHEIGHT@RATE FORMAT FILE: shows the file again and again, and waits until the camera gives it.
+# feed CAMERA WIDTHxHEIGHT@RATE FORMAT FILE: shows the file until the camera gives it. The driver keeps on showing
+# what it was given last, so whoever feeds it is halted then, and takes neither time nor marks of the capture.
 feed() {
     local camera=$1 node=$(($1 + 1)) width height rate format
     IFS=x@ read -r width height rate <<-SIZE
@@ -67,11 +67,12 @@ feed() {
     v4l2-ctl -d $node --set-fmt-video-out="$format" --stream-out-mmap=8 --stream-loop --stream-from="$4" >/dev/null 2>&1 &
     echo $! >"/tmp/feeder-$camera"
     await gives "$camera" "$format" "$4"
+    kill -STOP "$(cat "/tmp/feeder-$camera")"
 }
 
 unfeed() {
     [ -e "/tmp/feeder-$1" ] || return 0
-    kill "$(cat "/tmp/feeder-$1")"
+    kill -KILL "$(cat "/tmp/feeder-$1")"
     wait "$(cat "/tmp/feeder-$1")"
     rm "/tmp/feeder-$1"
 }
@@ -105,9 +106,9 @@ v4l2-ctl -d 0 --stream-mmap >/dev/null 2>&1 &
 second=$!
 sleep 1
 capture busy --device /dev/video0 --format GREY
-kill $second
+kill -KILL $second
 wait $second
-for request in reqbufs streamon; do
+for request in reqbufs qbuf streamon; do
     control 0 inject_vidioc_${request}_error=1
     capture $request --device /dev/video0 --format GREY
 done
@@ -125,16 +126,9 @@ control 0 percentage_of_dropped_buffers=0
 
 more_models() { [ "$(ls "/out/$1/models" | wc -l)" -gt "$2" ]; }
 
-# The driver's threads share this mark, and the output's takes some of them.
-mark_frames() {
-    for _ in 1 2 3 4 5 6; do
-        control 0 inject_v4l2_buf_flag_error=1
-        sleep 0.1
-    done
-}
-
 stall() {
-    mark_frames
+    control 0 inject_v4l2_buf_flag_error=1
+    sleep 1
     control 0 percentage_of_dropped_buffers=100
     sleep 3
     control 0 percentage_of_dropped_buffers=0
