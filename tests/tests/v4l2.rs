@@ -261,8 +261,9 @@ fn what_cannot_be_is_refused_in_a_sentence_and_leaves_no_files() {
         ("no-such-view", "/dev/video0 has no mode with two views of the calibration's 640x480 px"),
         ("adjusted", "/dev/video0 was asked for GREY 1024x400, but gives GREY 1280x480; ask for that"),
         ("no-capture", "/dev/video1 takes no pictures (it has no video capture capability)"),
-        // ENOENT, ENOTTY, EBUSY, and EINVAL of three requests.
+        // ENOENT, ENODEV, ENOTTY, EBUSY, and EINVAL of three requests.
         ("no-device", "/dev/video9 cannot be opened: there is no such device"),
+        ("gone", "/dev/video0 cannot be opened: it has been unplugged"),
         ("no-video", "/dev/null does not say what it can do: it is no Video4Linux device"),
         ("busy", "/dev/video0 does not take the format: another program uses it"),
         ("reqbufs", "/dev/video0 does not start to send: it refuses the format it was set to"),
@@ -274,6 +275,22 @@ fn what_cannot_be_is_refused_in_a_sentence_and_leaves_no_files() {
         assert_eq!(scenario.code, 1, "{name}: {}", scenario.errors);
         assert!(scenario.errors.contains(words), "{name}: {}", scenario.errors);
         assert_eq!(scenario.files(), [""; 0], "{name}");
+    }
+}
+
+#[test]
+#[ignore = "boots a machine: ./ci.sh v4l2"]
+fn another_program_is_given_the_errors_that_the_sentences_are_about() {
+    let Some(machine) = machine() else { return };
+    for (name, error) in [
+        ("busy", "Device or resource busy"),
+        ("streamon", "Invalid argument"),
+        ("failed", "Input/output error"),
+        ("gone", "No such device"),
+    ] {
+        let said = fs::read(machine.out.join(format!("{name}.witness"))).unwrap();
+        let said = String::from_utf8_lossy(&said);
+        assert!(said.contains(error), "{name}: {said}");
     }
 }
 

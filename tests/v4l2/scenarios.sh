@@ -1,6 +1,7 @@
 # What is done to `host capture` in the machine. Each scenario leaves in /out/NAME what was printed (`out.json`
 # and `err`), the exit code (`code`), the second at which the driver was told to fail (`begin`) and that at which
 # all was over (`end`), and the files that were written. What that has to be, tests/tests/v4l2.rs asserts outside.
+# NAME.witness is what another program says when the same is done to it: the number behind our sentence.
 #
 # Camera 0 gives what node 1 is shown, camera 2 what node 3 is.
 
@@ -106,12 +107,15 @@ v4l2-ctl -d 0 --stream-mmap >/dev/null 2>&1 &
 second=$!
 sleep 1
 capture busy --device /dev/video0 --format GREY
+v4l2-ctl -d 0 --set-fmt-video=pixelformat=YUYV >/out/busy.witness 2>&1
 kill -KILL $second
 wait $second
 for request in reqbufs qbuf streamon; do
     control 0 inject_vidioc_${request}_error=1
     capture $request --device /dev/video0 --format GREY
 done
+control 0 inject_vidioc_streamon_error=1
+v4l2-ctl -d 0 --stream-mmap --stream-count=1 >/out/streamon.witness 2>&1
 # Without its scaler the driver takes no other size than its source's, and says so when it has been set.
 OPTICS="--focal 300 --baseline 60"
 control 0 enable_capture_scaler=0,enable_capture_cropping=0,enable_capture_composing=0
@@ -137,12 +141,19 @@ stall() {
 }
 capture_while stalled stall
 
-# The driver's output breaks with its input.
+# The driver's output breaks with its input, and has to be fed anew.
 fail() { control 0 inject_fatal_streaming_error=1; }
 capture_while failed fail
+v4l2-ctl -d 0 --stream-mmap >/out/failed.witness 2>&1 &
+sleep 1
+fail
+wait $!
 feed 0 $BESIDE GREY GREY
 
+# The camera is back when the last program has let go of it; the one that feeds it has not.
 disconnect() { control 0 disconnect=1; }
 capture_while disconnected disconnect
+capture gone --device /dev/video0 --format GREY
+cat /dev/video0 >/out/gone.witness 2>&1
 
 echo "$(now) end"
