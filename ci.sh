@@ -131,8 +131,9 @@ part_firmware() {
         check cargo clippy -q -p firmware --target "$TARGET" --release --locked --no-default-features \
             --features "$features" -- -D warnings
     done
-    # As the user builds it.
+    # As the user builds it, and what it takes.
     check cargo build -q -p firmware --target "$TARGET" --release --locked
+    tests cargo test -q --locked -p system-tests --test footprint -- --nocapture
 }
 
 # What images take, and the core on emulated boards held against the core on this machine, stage by stage.
