@@ -2,7 +2,7 @@
 # The one list of checks.
 #
 #   ./ci.sh            everything
-#   ./ci.sh NAME...    single parts: fmt lint test doc firmware, and qemu, which test contains
+#   ./ci.sh NAME...    single parts: fmt lint test doc firmware v4l2, and qemu, which test contains
 #
 # Installs what a fresh Debian machine with rustup lacks. The last line is "N passed, N failed", counting
 # tests, and one for each check that is not made of tests. A part that ran no test fails. Exit codes: 0 all
@@ -10,7 +10,7 @@
 set -uo pipefail
 cd "$(dirname "$0")" || exit 1
 
-PARTS=(fmt lint test doc firmware)
+PARTS=(fmt lint test doc firmware v4l2)
 TARGET=thumbv7em-none-eabihf
 CASES=../shared/eval
 
@@ -131,8 +131,9 @@ part_firmware() {
         check cargo clippy -q -p firmware --target "$TARGET" --release --locked --no-default-features \
             --features "$features" -- -D warnings
     done
-    # As the user builds it.
+    # As the user builds it, and what it takes.
     check cargo build -q -p firmware --target "$TARGET" --release --locked
+    tests cargo test -q --locked -p system-tests --test footprint -- --nocapture
 }
 
 # What images take; the core on emulated boards held against the core on this machine, stage by stage; and the
@@ -140,6 +141,17 @@ part_firmware() {
 part_qemu() {
     emulator
     tests cargo test -q --locked -p system-tests --test emulator --test emulated_link --test footprint -- --nocapture
+}
+
+# Capture from a real driver, in an emulated machine with a kernel that has one.
+part_v4l2() {
+    # The kernel is fetched by today's list of packages.
+    ls -d target/v4l2/linux-image-* >/dev/null 2>&1 || install
+    need qemu-system-x86_64 qemu-system-x86
+    need busybox busybox-static
+    need v4l2-ctl v4l-utils
+    check cargo build -q --release --locked -p host
+    tests cargo test --release --locked -p system-tests --test v4l2 -- --ignored --nocapture
 }
 
 parts=("$@")

@@ -9,9 +9,9 @@ use firmware::ports::{CameraError, CameraFault, CameraPair, Clock, Exposure, Sid
 use host::shape::Shape;
 use image::GrayImage;
 use oracle::camera::{Bench, ControlBus, Dummy, PictureBus, SIZE, Scene, Time, Wiring};
+use oracle::cases;
 use oracle::scene::{drawn_pair, pair};
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::{Path, PathBuf};
 
 type Eyes = Pair<PictureBus, ControlBus, Time, Time>;
 
@@ -108,27 +108,12 @@ fn rendered_and_drawn_pairs_are_read() {
     assert_seen(&disc.map(GrayImage::into_raw));
 }
 
-fn cases() -> Option<Vec<PathBuf>> {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/eval");
-    let folder = std::env::var_os("OSSATURE_EVAL").map_or_else(beside, PathBuf::from).join("cases");
-    let Ok(entries) = std::fs::read_dir(&folder) else {
-        eprintln!("\n!!!! SKIPPED: no evaluation cases in {}; set OSSATURE_EVAL !!!!\n", folder.display());
-        return None;
-    };
-    let mut cases: Vec<_> = entries.map(|e| e.unwrap().path()).collect();
-    cases.retain(|case| case.join("left.png").is_file());
-    cases.sort();
-    Some(cases)
-}
-
 #[test]
 fn the_evaluation_cases_are_read() {
-    let Some(cases) = cases() else { return };
-    assert!(!cases.is_empty());
-    for case in cases {
-        let open = |name: &str| fit(&image::open(case.join(name)).unwrap().to_luma8());
-        println!("{}", case.display());
-        assert_seen(&["left.png", "right.png"].map(open));
+    let Some(folder) = cases::folder() else { return };
+    for case in cases::cases(&folder) {
+        println!("{}", cases::name(&case));
+        assert_seen(&cases::open(&case).0.each_ref().map(fit));
     }
 }
 

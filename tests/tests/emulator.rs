@@ -16,7 +16,6 @@ use oracle::cases;
 use oracle::core::{Core, Picture};
 use oracle::scene::{self, Pair};
 use rayon::prelude::*;
-use shared::fixed::PX;
 use shared::pipeline::{Settings, Side};
 use shared::stage::depth::Optics;
 use std::collections::BTreeMap;
@@ -37,46 +36,34 @@ struct Case {
     as_device: bool,
 }
 
-/// Rectified pairs with their focal lengths and offsets, px.
-fn pairs() -> Vec<(String, Pair, [f64; 2])> {
-    let shapes = Shape::ALL.into_par_iter().map(|shape| {
-        let camera = scene::camera(1);
-        (shape.name().to_owned(), scene::pair(shape, 1), [camera.left.fx, 0.0])
-    });
-    let mut pairs: Vec<_> = shapes.collect();
+/// Raw pairs with their calibrations.
+fn pairs() -> Vec<(String, (Pair, StereoCamera))> {
+    let shape = |shape: Shape| (shape.name().to_owned(), (scene::pair(shape, 1), scene::camera(1)));
+    let mut pairs: Vec<_> = Shape::ALL.into_par_iter().map(shape).collect();
     for case in cases::folder().map(|folder| cases::cases(&folder)).unwrap_or_default() {
-        let open = |name: &str| image::open(case.join(name)).unwrap().to_luma8();
-        let camera = StereoCamera::read(case.join("calib.yaml")).unwrap();
-        let rectification = Rectification::whole(&camera).unwrap();
-        let pair = rectification.images(open("left.png"), open("right.png")).unwrap();
-        let camera = rectification.camera();
-        pairs.push((format!("case {}", cases::name(&case)), pair, [camera.f, camera.disparity_offset()]));
+        pairs.push((format!("case {}", cases::name(&case)), cases::open(&case)));
     }
     pairs
 }
 
-/// Each pixel the mean of four.
-fn halved(image: &GrayImage) -> GrayImage {
-    GrayImage::from_fn(image.width() / 2, image.height() / 2, |u, v| {
-        let four = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| image.get_pixel(2 * u + i, 2 * v + j).0[0]);
-        image::Luma([((four.map(u32::from).iter().sum::<u32>() + 2) / 4) as u8])
-    })
-}
-
+/// Every pair, rectified as a device does it, at the two largest sizes that the boards have room for.
 fn all_cases() -> Vec<Case> {
     let mut all = Vec::new();
-    for (name, pair, optics) in pairs() {
-        let half = (pair.each_ref().map(halved), optics.map(|px| px / 2.0));
-        for (pair, optics) in [(pair, optics), half] {
+    for (name, raw) in pairs() {
+        let fits = |(pair, _): &(Pair, StereoCamera)| {
             let (width, height) = pair[0].dimensions();
-            if width > LARGEST.0 || height > LARGEST.1 {
-                continue;
-            }
-            let [focal, disparity_offset] = optics.map(|px| (px * f64::from(PX)).round() as i32);
+            width <= LARGEST.0 && height <= LARGEST.1
+        };
+        let sizes = std::iter::successors(Some(raw), |larger| Some(cases::halved(larger)));
+        for ([left, right], camera) in sizes.filter(fits).take(2) {
+            let rectification = Rectification::same_size(&camera).unwrap();
+            let model = rectification.model();
+            let pair = rectification.device_images(left, right).unwrap();
+            let optics =
+                Optics { focal: model.fixed_focal(), disparity_offset: model.fixed_disparity_offset() };
             for as_device in [false, true] {
                 let way = if as_device { "device" } else { "full" };
-                let name = format!("{name} {width}x{height} {way}");
-                let optics = Optics { focal, disparity_offset };
+                let name = format!("{name} {}x{} {way}", model.width, model.height);
                 all.push(Case { name, pair: pair.clone(), optics, as_device });
             }
         }

@@ -2,10 +2,9 @@
 //! are answered.
 
 use heapless::Vec as List;
-use host::calibration::{Camera, StereoCamera};
 use host::shape::Shape as Solid;
 use host::stage::rectify::Rectification;
-use image::{GrayImage, Luma};
+use oracle::cases;
 use oracle::link;
 use oracle::raster::Random;
 use oracle::scene::pair;
@@ -20,7 +19,6 @@ use shared::wire::{
     DISPARITY_STEP, Frame, MAX_FRAME, POSITION_STEP, PairReport, Shape, ShapeLists, TURN_STEP, ToHost,
     WireError,
 };
-use std::path::{Path, PathBuf};
 
 /// Largest errors of the fields of a shape, 1/256 px, degrees and 1/16384.
 #[derive(Clone, Copy, Debug, Default)]
@@ -157,52 +155,15 @@ fn lists_that_are_too_short_are_an_error_and_left_empty() {
     assert!(lists.controls.is_empty() && lists.branches.is_empty() && lists.contour.is_empty());
 }
 
-fn evaluation_cases() -> Option<PathBuf> {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/eval");
-    let folder = std::env::var_os("OSSATURE_EVAL").map_or_else(beside, PathBuf::from).join("cases");
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    eprintln!("\n!!!! SKIPPED: no evaluation cases in {}; set OSSATURE_EVAL !!!!\n", folder.display());
-    None
-}
-
-/// Each pixel the mean of four.
-fn halved(image: &GrayImage) -> GrayImage {
-    GrayImage::from_fn(image.width() / 2, image.height() / 2, |u, v| {
-        let at = |k: u32| u32::from(image.get_pixel(2 * u + k % 2, 2 * v + k / 2)[0]);
-        Luma([(((0..4).map(at).sum::<u32>() + 2) / 4) as u8])
-    })
-}
-
-/// The camera of halved pictures.
-fn half(camera: Camera) -> Camera {
-    let centre = |c: f64| (c + 0.5) / 2.0 - 0.5;
-    Camera {
-        width: camera.width / 2,
-        height: camera.height / 2,
-        fx: camera.fx / 2.0,
-        fy: camera.fy / 2.0,
-        cx: centre(camera.cx),
-        cy: centre(camera.cy),
-        skew: camera.skew / 2.0,
-        ..camera
-    }
-}
-
 #[test]
 fn every_case_fits_a_frame() {
-    let Some(folder) = evaluation_cases() else { return };
-    let mut cases: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect();
-    cases.sort();
-    for case in cases.iter().filter(|case| case.join("calib.yaml").is_file()) {
-        let name = case.file_name().unwrap().to_string_lossy();
-        let open = |name: &str| halved(&image::open(case.join(name)).unwrap().to_luma8());
-        let whole = StereoCamera::read(case.join("calib.yaml")).unwrap();
-        let camera = StereoCamera { left: half(whole.left), right: half(whole.right), ..whole };
+    let Some(folder) = cases::folder() else { return };
+    for case in cases::cases(&folder) {
+        let name = cases::name(&case);
+        let ([left, right], camera) = cases::halved(&cases::open(&case));
         let rectification = Rectification::same_size(&camera).unwrap();
         let model = rectification.model();
-        let pair = rectification.device_images(open("left.png"), open("right.png")).unwrap();
+        let pair = rectification.device_images(left, right).unwrap();
         let optics = Optics { focal: model.fixed_focal(), disparity_offset: model.fixed_disparity_offset() };
         let figures = |s: Shape<'_>| (bytes(&report(Ok(s))).len(), s.contour.len(), s.branches.len());
         let (len, points, branches) = describe(&pair, optics, figures).unwrap();

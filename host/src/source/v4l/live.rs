@@ -86,7 +86,7 @@ impl Optics {
 
 /// Reads pairs until `take` has enough, `stop` is set, or a camera fails. `stop` is set in the end. What is
 /// counted meanwhile is shown to `take`, and returned, with what is wrong with a camera if that ended it. A pair
-/// that waits is not handed on after that.
+/// that waits then is dropped, lest the end be late.
 pub fn run<D: Device + Send>(
     pairs: &mut Pairs<D>,
     optics: &Optics,
@@ -169,8 +169,11 @@ impl Slot {
         self.changed.notify_one();
     }
 
+    /// Ends the waiting; a shot that nobody fetched yet is dropped.
     fn close(&self) {
-        self.lock().closed = true;
+        let mut state = self.lock();
+        state.dropped += u64::from(state.shot.take().is_some());
+        state.closed = true;
         self.changed.notify_one();
     }
 

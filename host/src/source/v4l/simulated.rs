@@ -48,7 +48,7 @@ pub(crate) struct Simulated {
     pub(crate) starts: u32,
     /// How long it was waited for in vain.
     pub(crate) waited: Duration,
-    /// Real time that each frame takes.
+    /// Real time that each frame takes, and that passes until it is pulled out.
     pub(crate) pace: Duration,
 }
 
@@ -121,7 +121,10 @@ impl Device for Simulated {
                 Err(ErrorKind::Interrupted.into())
             }
             Some(Event::Error(code) | Event::RefuseStart(code)) => Err(io::Error::from_raw_os_error(code)),
-            None => Err(io::Error::from_raw_os_error(errno::ENODEV)),
+            None => {
+                std::thread::sleep(self.pace);
+                Err(io::Error::from_raw_os_error(errno::ENODEV))
+            }
         }
     }
 }
