@@ -121,11 +121,6 @@ impl<'a, T: Copy> List<'a, T> {
         self.entries[index] = self.entries[self.len];
         entry
     }
-
-    /// The entries, for as long as the memory is lent.
-    pub fn into_slice(self) -> &'a mut [T] {
-        &mut self.entries[..self.len]
-    }
 }
 
 impl<T> Deref for List<'_, T> {

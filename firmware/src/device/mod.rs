@@ -367,6 +367,6 @@ const _: () = {
     const QVGA: usize = knots(<crate::memory::Qvga as Storage>::CAPACITIES.size);
     assert!(
         size_of::<Device<'_>>() + size_of::<Desk<QVGA>>() <= 14 * 1024,
-        "the core's memory, stack and drivers need the rest of 400 KB"
+        "the core's memory and the drivers need the rest of 400 KB of variables"
     );
 };

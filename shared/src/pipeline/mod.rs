@@ -205,7 +205,7 @@ impl Run {
     }
 
     /// From an eye's mask to its skeleton. The right eye's is but looked at, unless the method is the
-    /// paper's: without it the same comes out.
+    /// paper's: without it the same shape comes out.
     ///
     /// # Errors
     /// The first [`Finding`] that refuses.

@@ -9,7 +9,7 @@ use crate::limits::CapacityError;
 use crate::pipeline::{Finding, Side};
 
 /// What a [`CapacityError`] can be about, by its code; code 0 is anything else. Names are appended.
-const LISTS: [&str; 32] = [
+const LISTS: [&str; 35] = [
     "memory",
     "ball depths",
     "balls",
@@ -42,6 +42,9 @@ const LISTS: [&str; 32] = [
     "words in a bitmap",
     "words of scratch",
     "knots",
+    "pixels in a picture",
+    "control points of a fit",
+    "entries of a fit",
 ];
 
 pub(super) const fn side_code(side: Side) -> u32 {

@@ -17,7 +17,7 @@ type Bytes = Pipe<CriticalSectionRawMutex, 2048>;
 pub(super) static INCOMING: Bytes = Bytes::new();
 /// To the host.
 pub(super) static OUTGOING: Bytes = Bytes::new();
-/// Whether a host has the port open.
+/// Whether a host has set the device up.
 pub(super) static OPEN: AtomicBool = AtomicBool::new(false);
 
 /// Longest packet of full speed.
