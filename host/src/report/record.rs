@@ -54,6 +54,8 @@ pub struct Rasters {
 /// The figures and lists of an eye.
 #[derive(Clone, Debug, Default)]
 pub struct Parts {
+    /// How many pixels have each grey value, 0 to 255.
+    pub histogram: Vec<u32>,
     /// Grey level between object and background.
     pub level: u8,
     /// The object's side of it.
@@ -208,7 +210,10 @@ impl Rasters {
 impl Parts {
     fn keep(&mut self, product: &Product<'_>) {
         match product {
-            Product::Threshold(_, _, level, tone) => (self.level, self.tone) = (*level, Some(*tone)),
+            Product::Threshold(_, histogram, level, tone) => {
+                (self.level, self.tone) = (*level, Some(*tone));
+                self.histogram = histogram.to_vec();
+            }
             Product::Mask(mask, components) => {
                 (self.area, self.bounds, self.components) = (mask.count(), mask.bounds(), *components);
             }

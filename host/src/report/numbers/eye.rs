@@ -15,6 +15,8 @@ pub(super) struct EyeFigures {
     threshold_grey: u8,
     /// `bright` or `dark`: the object's side of the threshold.
     tone: Option<&'static str>,
+    /// How many pixels have each grey value, 0 to 255.
+    histogram_px: Option<Vec<u32>>,
     area_px2: usize,
     /// First column and row of the object.
     first_px: Option<[u16; 2]>,
@@ -55,6 +57,7 @@ impl EyeFigures {
                 Tone::Bright => "bright",
                 Tone::Dark => "dark",
             }),
+            histogram_px: seen.then(|| eye.histogram.clone()),
             area_px2: eye.area,
             first_px: eye.bounds.map(|b| [b.min.u, b.min.v]),
             last_px: eye.bounds.map(|b| [b.max.u, b.max.v]),

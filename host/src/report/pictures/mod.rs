@@ -5,6 +5,7 @@ mod canvas;
 mod colour;
 pub(crate) mod eye;
 pub(crate) mod gallery;
+mod histogram;
 mod model;
 mod pair;
 mod panel;
@@ -20,7 +21,8 @@ use shared::pipeline::Side;
 use super::words::view;
 
 /// File names of all pictures that a run may have, in the order of the stages.
-pub const NAMES: [&str; 9] = [
+pub const NAMES: [&str; 10] = [
+    "0-threshold.png",
     "1-mask.png",
     "2-contour.png",
     "3-distance.png",
@@ -50,6 +52,7 @@ pub fn draw(run: &Run<'_>) -> Vec<(&'static str, RgbImage)> {
         Mode::Paper { omega } => (0, omega),
     };
     let painters: [&(dyn Fn() -> Option<RgbImage> + Sync); NAMES.len()] = [
+        &|| Some(histogram::histograms(&views)),
         &|| eye::mask(&views),
         &|| eye::contour(&views),
         &|| eye::distance(&views),
