@@ -69,7 +69,7 @@ fn carry(bench: &mut Bench<Eyes>, port: &mut Port, fault: Fault, limit: usize) {
 /// A device in its own thread.
 fn device(scenes: Pair) -> Bench<Eyes> {
     let time = Time::default();
-    let (eyes, _) = Eyes::new(scenes.map(image::GrayImage::into_raw), time.clone());
+    let (eyes, _) = Eyes::new(scenes.map(GrayImage::into_raw), time.clone());
     Bench::new(eyes, time, &Rc::new(RefCell::new(Page::default())))
 }
 
@@ -285,11 +285,14 @@ fn a_pseudo_terminal_is_a_port() {
 }
 
 /// A reader that is counted while it is open.
-struct Counted(Box<dyn Read + Send>, Arc<()>);
+struct Counted {
+    port: Box<dyn Read + Send>,
+    _open: Arc<()>,
+}
 
 impl Read for Counted {
     fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
-        self.0.read(bytes)
+        self.port.read(bytes)
     }
 }
 
@@ -304,7 +307,7 @@ fn a_port_is_let_go_before_it_is_opened_again() {
             return Err(PortError::None);
         }
         let Port { reader, writer } = address.open(921_600)?;
-        Ok(Port { reader: Box::new(Counted(reader, open.clone())), writer })
+        Ok(Port { reader: Box::new(Counted { port: reader, _open: open.clone() }), writer })
     };
     let (mut session, hello) = Session::begin(Box::new(opener), None).unwrap();
     let (end, mut told) = (Instant::now() + Duration::from_secs(20), 0);
