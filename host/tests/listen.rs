@@ -106,6 +106,22 @@ fn a_recording_that_was_cut_off_or_damaged_is_told() {
     let told = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(1));
     assert!(told.contains("is damaged at byte 16"), "{told}");
-    let output = replay(&tape, &["--mode", "paper"]);
-    assert_eq!(output.status.code(), Some(2));
+    for of_pictures in [&["--mode", "paper"][..], &["--swap"], &["--calib", "x"], &["--threshold", "9"]] {
+        let output = replay(&tape, of_pictures);
+        assert_eq!(output.status.code(), Some(2), "{of_pictures:?}");
+    }
+}
+
+#[test]
+fn results_that_cannot_be_written_are_a_failure_and_no_refusal() {
+    let folder = TempDir::new().unwrap();
+    let tape = record(folder.path());
+    fs::write(folder.path().join("models"), "in the way").unwrap();
+    let output = replay(&tape, &["--json", "--out", "models"]);
+    assert_eq!(output.status.code(), Some(1));
+    let text = String::from_utf8(output.stdout).unwrap();
+    let lines: Vec<Value> = text.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let [device, failure] = lines.as_slice() else { panic!("{text}") };
+    assert_eq!(device["device"]["board"], "paper");
+    assert!(failure["error"].as_str().unwrap().contains("models"), "{failure}");
 }

@@ -4,8 +4,10 @@
 
 use host::shape::Shape;
 use host::source::serial::link::frames;
-use host::source::serial::port::{Address, Port};
+use host::source::serial::port::{Address, Port, PortError};
 use host::source::serial::recording::Recording;
+use host::source::serial::session::Session;
+use image::GrayImage;
 use oracle::camera::Time;
 use oracle::device::{Bench, Eyes, Page};
 use oracle::link;
@@ -18,8 +20,9 @@ use std::io::{ErrorKind, Read, Write};
 use std::os::unix::net::UnixListener;
 use std::path::Path;
 use std::rc::Rc;
+use std::sync::Arc;
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
 const SHAPE: Shape = Shape::Screwdriver;
@@ -66,7 +69,7 @@ fn carry(bench: &mut Bench<Eyes>, port: &mut Port, fault: Fault, limit: usize) {
 /// A device in its own thread.
 fn device(scenes: Pair) -> Bench<Eyes> {
     let time = Time::default();
-    let (eyes, _) = Eyes::new(scenes.map(image::GrayImage::into_raw), time.clone());
+    let (eyes, _) = Eyes::new(scenes.map(GrayImage::into_raw), time.clone());
     Bench::new(eyes, time, &Rc::new(RefCell::new(Page::default())))
 }
 
@@ -250,18 +253,16 @@ fn a_device_that_hangs_up_is_waited_for() {
     assert_eq!(Recording::read(Path::new(&tape)).unwrap().connections.len(), 2);
 }
 
-#[test]
-fn a_pseudo_terminal_is_a_port() {
+/// A device behind a pseudo-terminal, which stays when nobody has it open.
+fn terminal(pictures: Pair) -> String {
     use serialport::SerialPort;
-    let (folder, pictures) = scene();
     let (mut master, slave) = serialport::TTYPort::pair().unwrap();
     let name = slave.name().unwrap();
     master.set_timeout(Duration::from_millis(1)).unwrap();
-    let theirs = pictures.clone();
     thread::spawn(move || {
         let writer = master.try_clone_native().unwrap();
         let mut port = Port { reader: Box::new(master), writer: Box::new(writer) };
-        let mut bench = device(theirs);
+        let mut bench = device(pictures);
         loop {
             // Between two openings of the other end nobody is there.
             carry(&mut bench, &mut port, intact, usize::MAX);
@@ -269,11 +270,61 @@ fn a_pseudo_terminal_is_a_port() {
         }
     });
     drop(slave);
+    name
+}
+
+#[test]
+fn a_pseudo_terminal_is_a_port() {
+    let (folder, pictures) = scene();
+    let name = terminal(pictures);
     let folder = folder.path();
     prepare(folder, &name);
     let (calib, out) = (within(folder, "calib.yaml"), within(folder, "out"));
     host(&["listen", "--port", &name, "--calib", &calib, "--frames", "1", "--out", &out]).unwrap();
     assert!(model(&folder.join("out/000001")) == direct(folder));
+}
+
+/// A reader that is counted while it is open.
+struct Counted {
+    port: Box<dyn Read + Send>,
+    _open: Arc<()>,
+}
+
+impl Read for Counted {
+    fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
+        self.port.read(bytes)
+    }
+}
+
+#[test]
+fn a_port_is_let_go_before_it_is_opened_again() {
+    let address = Address::Path(terminal(pair(SHAPE, 2)));
+    let (open, mut tries) = (Arc::new(()), 0);
+    let opener = move || {
+        assert_eq!(Arc::strong_count(&open), 1, "one at a time");
+        tries += 1;
+        if matches!(tries, 2 | 3) {
+            return Err(PortError::None);
+        }
+        let Port { reader, writer } = address.open(921_600)?;
+        Ok(Port { reader: Box::new(Counted { port: reader, _open: open.clone() }), writer })
+    };
+    let (mut session, hello) = Session::begin(Box::new(opener), None).unwrap();
+    let (end, mut told) = (Instant::now() + Duration::from_secs(20), 0);
+    let again = session.resume(|| Instant::now() >= end, |_| told += 1).unwrap();
+    assert_eq!(again.map(|hello| hello.board), Some(hello.board));
+    assert_eq!((session.tally().reconnections, told), (1, 1));
+}
+
+#[test]
+fn a_mask_that_cannot_be_is_told_why() {
+    let folder = TempDir::new().unwrap();
+    let blank = pair(SHAPE, 2).map(|picture| GrayImage::new(picture.width(), picture.height()));
+    let port = serve(folder.path(), &blank, intact, usize::MAX);
+    let out = within(folder.path(), "mask");
+    let start = Instant::now();
+    let refused = host(&["device", "grab", "mask", "--out", &out, "--port", &port]).unwrap_err();
+    assert!(!refused.contains("cables") && start.elapsed() < Duration::from_secs(30), "{refused}");
 }
 
 /// A peer that sends the same bytes to whoever connects.
@@ -305,4 +356,9 @@ fn strangers_are_told_from_devices() {
 
     let gone = within(folder.path(), "nobody");
     assert!(host(&["device", "info", "--port", &gone]).unwrap_err().contains("there is no port"));
+
+    let (calib, tape) = (within(folder.path(), "calib.yaml"), within(folder.path(), "tape"));
+    camera(2).write_opencv_yaml(&calib).unwrap();
+    let refused = host(&["listen", "--port", &gone, "--calib", &calib, "--record", &tape]).unwrap_err();
+    assert!(refused.contains("there is no port") && !Path::new(&tape).exists(), "{refused}");
 }

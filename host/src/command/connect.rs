@@ -26,7 +26,7 @@ pub(super) struct PortArgs {
     #[arg(long, global = true, value_name = "PATH|auto", default_value = "auto")]
     port: Address,
     /// Rate of a serial port with wires; USB has its own
-    #[arg(long, global = true, value_name = "BAUD", default_value_t = 115_200, value_parser = clap::value_parser!(u32).range(300..))]
+    #[arg(long, global = true, value_name = "BAUD", default_value_t = 921_600, value_parser = clap::value_parser!(u32).range(300..))]
     baud: u32,
 }
 
@@ -88,7 +88,7 @@ pub(super) fn link_in_words(tally: &Tally) -> Option<String> {
         (frames.rejected_frames(), "damaged frame", "damaged frames"),
         (frames.missing, "frame missing", "frames missing"),
         (frames.repeated, "frame sent twice", "frames sent twice"),
-        (tally.unreadable, "frame of another version", "frames of another version"),
+        (tally.unreadable, "frame that could not be read", "frames that could not be read"),
         (tally.reconnections, "reconnection", "reconnections"),
     ];
     let told: Vec<String> =

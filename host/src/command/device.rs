@@ -25,6 +25,7 @@ use super::connect::{PortArgs, check_calibration, hello_as_json, model_of, reset
 use super::table::Table;
 use super::{Failure, say, say_json};
 use crate::output::{grey_png, write_together};
+use crate::reconstruct::Refusal;
 use crate::report::words::{parse_polarity, parse_threshold};
 use crate::source::serial::inbox::{Hello, Message};
 use crate::source::serial::mosaic::Mosaic;
@@ -200,19 +201,31 @@ fn parse_exposure(text: &str) -> Result<ExposureSetting, String> {
 
 /// Both pictures of one pair.
 fn grab(session: &mut Session, kind: PictureKind) -> Result<[GrayImage; 2], Failure> {
+    let mut refused = None;
     for _ in 0..TRIES {
+        // Nothing is left of what was asked for before.
+        session.order(&ToDevice::Stop)?;
         session.order_cameras(&ToDevice::Grab(kind))?;
         let (end, mut mosaic) = (Instant::now() + PICTURES, Mosaic::new(kind));
         while Instant::now() < end {
-            if let Some((Message::Picture(part), _)) = session.receive(Duration::from_millis(250))? {
-                mosaic.add(&part);
+            match session.receive(Duration::from_millis(250))? {
+                Some((Message::Picture(part), _)) => mosaic.add(&part),
+                // Behind its pictures, if there were any: no more will come.
+                Some((Message::Pair(pair), _)) if pair.result.is_err() => {
+                    refused = pair.result.err();
+                    break;
+                }
+                _ => {}
             }
             if let Some(pictures) = mosaic.pictures() {
                 return Ok(pictures);
             }
         }
     }
-    Err("the pictures did not come whole; look at the cables".into())
+    Err(match refused {
+        Some(finding) => Refusal::from(finding).into(),
+        None => "the pictures did not come whole; look at the cables".into(),
+    })
 }
 
 fn write(folder: &Path, pictures: &[GrayImage; 2]) -> Result<[PathBuf; 2], Failure> {

@@ -6,7 +6,8 @@
 //!
 //! Each pair leaves a folder of its own in --out, numbered as they come, as `host replay` does; what does not
 //! give a trustworthy model is refused with the reason, and the others go on. A device that is unplugged or
-//! starts anew is waited for. It goes on until --frames pairs have come, --seconds have passed, or Ctrl-C.
+//! starts anew is waited for. It goes on until --frames pairs have come, --seconds have passed, or Ctrl-C, which
+//! ends after the model at hand; a second one ends at once.
 //!
 //! --record keeps what came, byte for byte; `host replay FILE` makes the same models of it again.
 //!
@@ -17,6 +18,7 @@
 //!   host listen --port /dev/ttyACM0 --calib calib.yaml --frames 10 --out models
 //!   host listen --port unix:/tmp/camera --calib calib.yaml --record cup.link --json
 
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
@@ -35,12 +37,12 @@ use super::model::{self, Model};
 use super::options::GrowArgs;
 use super::table::{count, sides};
 use super::{Failure, interruption, note, say, words_of};
-use crate::reconstruct::Options;
+use crate::reconstruct::{Options, Refusal};
 use crate::report::words::{parse_polarity, parse_threshold};
 use crate::source::serial::inbox::{Hello, Inbox, Message, Pair};
 use crate::source::serial::link::frames;
 use crate::source::serial::recording::{Recording, Writer};
-use crate::source::serial::session::{Session, Tally};
+use crate::source::serial::session::{Session, SessionError, Tally};
 
 /// Longest that is waited for a frame before time is looked at.
 const LOOK: Duration = Duration::from_millis(250);
@@ -88,11 +90,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let options = args.grow.device_options();
     let mut desk = Desk::new((&model, &options), &args.out, args.json);
     let end = args.seconds.map(|seconds| Instant::now() + Duration::from_secs(seconds.into()));
-    let recording = args.record.as_ref().map(|path| Writer::begin(path, &model)).transpose()?;
-    let tap = recording.map(|writer| Arc::new(Mutex::new(writer)));
     let stop = interruption()?;
-    let (mut session, hello) = args.port.begin(tap)?;
-    desk.greeted(&hello)?;
+    let mut session = begin(args, &model, &mut desk)?;
     let heard = listen(args, &mut session, &mut desk, || {
         stop.load(Ordering::Relaxed) || end.is_some_and(|end| Instant::now() >= end)
     });
@@ -105,28 +104,47 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     desk.close(&session.tally())
 }
 
+/// Find the device and greet it. The recording has to be new before anything comes, and is taken away again if
+/// there is nothing to record.
+fn begin(args: &Args, model: &PairModel, desk: &mut Desk<'_>) -> Result<Session, Failure> {
+    let recording = args.record.as_ref().map(|path| Writer::begin(path, model)).transpose()?;
+    let tap = recording.map(|writer| Arc::new(Mutex::new(writer)));
+    let begun = args.port.begin(tap).map_err(Failure::from);
+    let greeted = begun.and_then(|(session, hello)| desk.greeted(&hello).map(|()| session));
+    if let (Err(_), Some(path)) = (&greeted, &args.record) {
+        // Why there is no device matters more than a file that stays.
+        let _ = fs::remove_file(path);
+    }
+    greeted
+}
+
 fn listen(
     args: &Args,
     session: &mut Session,
     desk: &mut Desk<'_>,
     over: impl Fn() -> bool,
 ) -> Result<(), Failure> {
-    start(args, session)?;
+    let mut started = false;
     while args.frames.is_none_or(|frames| desk.pairs < frames) && !over() {
-        match session.receive(LOOK) {
+        let came = if started { session.receive(LOOK) } else { start(args, session).map(|()| None) };
+        started = true;
+        match came {
             Ok(Some((message, first))) => {
-                if first && matches!(message, Message::Hello(_)) {
+                if first && let Message::Hello(hello) = &message {
                     desk.remark("the device has started anew");
-                    start(args, session)?;
+                    desk.greeted(hello)?;
+                    started = false;
                 }
                 desk.take(session.inbox(), message)?;
             }
             Ok(None) => {}
             Err(error) if error.is_loss() => {
                 desk.remark(&format!("{}; waiting for the device", words_of(&error)));
-                let Some(hello) = session.resume(&over)? else { break };
+                let Some(hello) = session.resume(&over, |error| desk.remark(&words_of(error)))? else {
+                    break;
+                };
                 desk.greeted(&hello)?;
-                start(args, session)?;
+                started = false;
             }
             Err(error) => return Err(error.into()),
         }
@@ -136,14 +154,14 @@ fn listen(
 }
 
 /// Have a device that was greeted begin.
-fn start(args: &Args, session: &mut Session) -> Result<(), Failure> {
+fn start(args: &Args, session: &mut Session) -> Result<(), SessionError> {
     if let Some(threshold) = args.threshold {
         session.order(&ToDevice::Threshold(threshold))?;
     }
     if let Some(polarity) = args.polarity {
         session.order(&ToDevice::Polarity(polarity))?;
     }
-    Ok(session.order_cameras(&ToDevice::Start)?)
+    session.order_cameras(&ToDevice::Start)
 }
 
 /// Makes the models of a recording again.
@@ -245,7 +263,7 @@ impl<'a> Desk<'a> {
                     || described(&told, &model, &warnings, &folder),
                 )
             }
-            Err(failure) => {
+            Err(failure) if failure.is::<Refusal>() => {
                 let sentence = words_of(&*failure);
                 self.line(
                     || {
@@ -256,6 +274,7 @@ impl<'a> Desk<'a> {
                     || format!("pair {}: refused: {sentence}", told["pair"]),
                 )
             }
+            Err(failure) => Err(failure),
         }
     }
 

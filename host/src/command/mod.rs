@@ -110,7 +110,7 @@ impl Cli {
             Command::Capture(args) => capture::run(args),
             Command::ListDevices(args) => told(args.json, list_devices::run(args)),
             Command::Calibrate(args) => told(args.json, calibrate::run(args)),
-            Command::Listen(args) => told(args.json, listen::run(args)),
+            Command::Listen(args) => told_in_line(args.json, listen::run(args)),
             Command::Device(args) => told(args.json, device::run(args)),
             Command::Demo(args) => told(args.json, demo::run(args)),
             Command::Render(args) => render::run(args),
@@ -153,14 +153,32 @@ fn say_json(value: &serde_json::Value) -> Result<(), Failure> {
     say(&format!("{value:#}\n"))
 }
 
+/// Writes a line of JSON to standard output.
+fn say_json_line(value: &serde_json::Value) -> Result<(), Failure> {
+    say(&format!("{value}\n"))
+}
+
 /// Passes a result on; a failure is a JSON document too, if one was asked for.
 fn told<T>(json: bool, result: Result<T, Failure>) -> Result<T, Failure> {
+    told_by(say_json, json, result)
+}
+
+/// Passes a result on; a failure is a line of JSON too, if lines were asked for.
+fn told_in_line<T>(json: bool, result: Result<T, Failure>) -> Result<T, Failure> {
+    told_by(say_json_line, json, result)
+}
+
+fn told_by<T>(
+    say: fn(&serde_json::Value) -> Result<(), Failure>,
+    json: bool,
+    result: Result<T, Failure>,
+) -> Result<T, Failure> {
     if let Err(failure) = &result
         && json
         && !failure.is::<clap::Error>()
     {
         // The failure itself matters more than that it cannot be told here.
-        let _ = say_json(&serde_json::json!({ "error": words_of(&**failure) }));
+        let _ = say(&serde_json::json!({ "error": words_of(&**failure) }));
     }
     result
 }

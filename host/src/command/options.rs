@@ -79,6 +79,11 @@ enum Mode {
 }
 
 impl MethodArgs {
+    /// Whether it was said how the object is told from the background.
+    pub fn tells_object(&self) -> bool {
+        self.threshold != Threshold::Otsu || self.polarity != Polarity::BrightObject
+    }
+
     /// The choices for a device's shape, in the terms of [`crate::reconstruct`].
     ///
     /// # Errors
@@ -173,6 +178,11 @@ pub struct CameraArgs {
 pub struct NoCalibration;
 
 impl CameraArgs {
+    /// Whether anything was given.
+    pub const fn are_given(&self) -> bool {
+        self.calib.is_some() || self.focal.is_some() || self.baseline.is_some()
+    }
+
     /// The calibration for a pair with these images, and the file beside the images that it comes from, if it
     /// does.
     ///
@@ -234,6 +244,11 @@ pub struct SceneArgs {
 const FIRST: &str = "first";
 
 impl SceneArgs {
+    /// Whether anything is known.
+    pub const fn is_known(&self) -> bool {
+        self.background.is_some() || self.roi.is_some()
+    }
+
     /// Whether the first pair is the background.
     pub fn takes_first(&self) -> bool {
         self.background.as_deref() == Some(FIRST)

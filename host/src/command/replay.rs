@@ -36,9 +36,9 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 
 use super::model::{self, Model, Order};
-use super::options::{CameraArgs, MethodArgs, SceneArgs};
+use super::options::{CameraArgs, MethodArgs, SceneArgs, usage};
 use super::table::Table;
-use super::{Failure, batch, listen, note, say, say_json, told, words_of};
+use super::{Failure, batch, listen, note, say, say_json, told, told_in_line, words_of};
 use crate::reconstruct::Options;
 use crate::source::find::{Found, find};
 use crate::source::scene::Scene;
@@ -101,13 +101,13 @@ struct Success {
 ///
 /// If there is no pair, or any is refused.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let mut options = if args.as_device { args.method.device_options() } else { args.method.options() }?;
     if let [input] = args.input.as_slice()
         && is_recording(Path::new(input))
     {
-        let options = args.method.device_options()?;
-        return told(args.json, listen::replay(Path::new(input), &options, &args.out, args.json));
+        let options = recording_options(args)?;
+        return told_in_line(args.json, listen::replay(Path::new(input), &options, &args.out, args.json));
     }
+    let mut options = if args.as_device { args.method.device_options() } else { args.method.options() }?;
     let one_file = args.layout.filter(|layout| *layout != Layout::Two);
     let mut scene = told(args.json, args.scene.scene(one_file, args.swap, &mut options))?;
     let mut found = told(args.json, pairs(args))?;
@@ -121,6 +121,18 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         say(&as_text(&done, &found))?;
     }
     summary(done, &found)
+}
+
+/// The choices for a recording.
+fn recording_options(args: &Args) -> Result<Options, Failure> {
+    let of_pictures = args.layout.is_some() || args.swap || args.as_device;
+    if of_pictures || args.cameras.are_given() || args.scene.is_known() || args.method.tells_object() {
+        return Err(usage(
+            "a recording holds its calibration and what the device found in its pictures: leave out --layout, --swap, \
+             --as-device, --calib, --focal, --baseline, --background, --roi, --threshold and --polarity",
+        ));
+    }
+    args.method.device_options()
 }
 
 /// The pairs that are named.

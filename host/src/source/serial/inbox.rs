@@ -31,7 +31,7 @@ pub struct Hello {
 pub struct Pair {
     /// Its number since the device started.
     pub number: u32,
-    /// When the left and the right picture began, us since the device started.
+    /// When the left and the right picture were complete, us since the device started.
     pub stamps: [u64; 2],
     /// Levels between object and background, 0 in an eye that was not looked at.
     pub levels: [u8; 2],

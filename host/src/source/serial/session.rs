@@ -139,7 +139,8 @@ impl Tally {
 pub struct Session {
     open: Opener,
     tap: Option<Tap>,
-    link: Link,
+    /// None while the device is gone: a port is let go before it is opened again.
+    link: Option<Link>,
     /// Frames that came while something else was waited for.
     waiting: VecDeque<Arrived>,
     inbox: Inbox,
@@ -153,7 +154,7 @@ impl Session {
     /// # Errors
     /// A [`SessionError`] that says what to do.
     pub fn begin(mut open: Opener, tap: Option<Tap>) -> Result<(Self, Hello), SessionError> {
-        let link = Link::new(open()?, tap.clone())?;
+        let link = Some(Link::new(open()?, tap.clone())?);
         let (inbox, heard) = (Inbox::new()?, Instant::now());
         let (waiting, tally) = (VecDeque::new(), Tally::default());
         let mut session = Self { open, tap, link, waiting, inbox, tally, heard };
@@ -161,19 +162,37 @@ impl Session {
         Ok((session, hello))
     }
 
-    /// Wait for a device that is gone, until `over`, and exchange hellos again; nothing if it stays away.
+    /// Wait for a device that is gone, until `over`, and exchange hellos again; nothing if it stays away. `tell`
+    /// hears why the port cannot be opened, once each time that the reason changes.
     ///
     /// # Errors
     /// A [`SessionError`] other than that it is gone.
-    pub fn resume(&mut self, over: impl Fn() -> bool) -> Result<Option<Hello>, SessionError> {
+    pub fn resume(
+        &mut self,
+        over: impl Fn() -> bool,
+        mut tell: impl FnMut(&PortError),
+    ) -> Result<Option<Hello>, SessionError> {
+        let mut told = String::new();
         loop {
+            if let Some(link) = self.link.take() {
+                self.tally.add(&link.counters());
+            }
             if over() {
                 return Ok(None);
             }
             thread::sleep(LOOK_AGAIN);
-            let Ok(port) = (self.open)() else { continue };
-            self.tally.add(&self.link.counters());
-            self.link = Link::new(port, self.tap.clone())?;
+            let port = match (self.open)() {
+                Ok(port) => port,
+                Err(error) => {
+                    let words = error.to_string();
+                    if words != told {
+                        tell(&error);
+                        told = words;
+                    }
+                    continue;
+                }
+            };
+            self.link = Some(Link::new(port, self.tap.clone())?);
             match self.greet() {
                 Ok(hello) => {
                     self.tally.reconnections = self.tally.reconnections.saturating_add(1);
@@ -185,14 +204,18 @@ impl Session {
         }
     }
 
+    fn link(&mut self) -> Result<&mut Link, LinkError> {
+        self.link.as_mut().ok_or(LinkError::Lost(None))
+    }
+
     /// Say hello until the device does.
     fn greet(&mut self) -> Result<Hello, SessionError> {
         let end = Instant::now() + GREETING;
         self.waiting.clear();
         while Instant::now() < end {
-            let number = self.link.send(&ToDevice::Hello)?;
+            let number = self.link()?.send(&ToDevice::Hello)?;
             let next = Instant::now() + HELLO_AGAIN;
-            while let Some(frame) = self.link.receive(next.saturating_duration_since(Instant::now()))? {
+            while let Some(frame) = self.link()?.receive(next.saturating_duration_since(Instant::now()))? {
                 match self.inbox.read(&frame.frame()) {
                     Ok(Message::Hello(hello)) => {
                         self.heard = Instant::now();
@@ -208,7 +231,7 @@ impl Session {
                 }
             }
         }
-        Err(SessionError::Silent(self.link.bytes()))
+        Err(SessionError::Silent(self.link()?.bytes()))
     }
 
     /// Give an order, again if need be, until it is answered.
@@ -274,9 +297,9 @@ impl Session {
     ) -> Result<T, SessionError> {
         let end = Instant::now() + ANSWER;
         while Instant::now() < end {
-            let number = self.link.send(command)?;
+            let number = self.link()?.send(command)?;
             let next = Instant::now() + COMMAND_AGAIN;
-            while let Some(frame) = self.link.receive(next.saturating_duration_since(Instant::now()))? {
+            while let Some(frame) = self.link()?.receive(next.saturating_duration_since(Instant::now()))? {
                 self.heard = Instant::now();
                 match self.inbox.read(&frame.frame()).ok().and_then(|message| answers(&message, number)) {
                     Some(answer) => return Ok(answer),
@@ -295,7 +318,7 @@ impl Session {
     pub fn receive(&mut self, within: Duration) -> Result<Option<(Message, bool)>, SessionError> {
         let frame = match self.waiting.pop_front() {
             Some(frame) => Some(frame),
-            None => self.link.receive(within)?,
+            None => self.link()?.receive(within)?,
         };
         let Some(frame) = frame else {
             return if self.heard.elapsed() < SILENCE { Ok(None) } else { Err(SessionError::Quiet) };
@@ -319,7 +342,9 @@ impl Session {
     #[must_use]
     pub fn tally(&self) -> Tally {
         let mut tally = self.tally;
-        tally.add(&self.link.counters());
+        if let Some(link) = &self.link {
+            tally.add(&link.counters());
+        }
         tally
     }
 }
