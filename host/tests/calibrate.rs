@@ -130,6 +130,18 @@ fn rows_tell_a_right_calibration_from_a_wrong_one() {
     let error = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(1));
     assert!(error.contains("rows differ by 5.") && error.contains("calibrate again"), "{error}");
+    // Each pair is told all the same.
+    let told = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(told.matches("in column").count(), 6, "{told}");
+    let output = run(folder.path(), &["calibrate", "--check", "check", "--calib", "wrong.yaml", "--json"]);
+    assert_eq!(output.status.code(), Some(1));
+    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(told["error"].as_str().unwrap().contains("rows differ"), "{told}");
+    for pair in told["pairs"].as_array().unwrap() {
+        let columns = pair["columns_px"].as_array().unwrap();
+        // The objects stand in the middle of the view.
+        assert!(columns.iter().all(|u| (100.0..540.0).contains(&u.as_f64().unwrap())), "{told}");
+    }
 }
 
 #[test]

@@ -12,9 +12,11 @@
 //!
 //! --best makes one model, of the pair of a burst with the fewest warnings and then the smallest part of the
 //! outline without counterpart. --record keeps every pair that was worked on; `host replay` makes the same
-//! models of it, byte for byte; with --only-record it makes none, and needs no calibration. --background first takes the first pair for the scene without the object.
+//! models of it, byte for byte; with --only-record it makes none, and needs no calibration. --background first
+//! takes the first pair for the scene without the object.
 //!
-//! Succeeds if any pair gave a model and the camera did not fail. docs/capture.md tells more.
+//! Succeeds if any pair gave a model (with --only-record: was recorded) and the camera did not fail.
+//! docs/capture.md tells more.
 //!
 //! Examples:
 //!   host capture --device /dev/video0 --calib calib.yaml

@@ -33,16 +33,30 @@ type Found = Result<Camera, CameraError>;
 ///
 /// # Errors
 ///
-/// If the system has no such devices at all.
+/// If neither cameras nor serial ports can be listed; why one of them cannot is told in its place.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let (cameras, ports) = (kernel::list()?, serial_ports()?);
+    let cameras = kernel::list().map_err(|error| words_of(&error));
+    let ports = serial_ports().map_err(|error| format!("serial ports cannot be listed: {error}"));
+    if let (Err(cameras), Err(ports)) = (&cameras, &ports) {
+        return Err(format!("{cameras}; {ports}").into());
+    }
     if args.json {
         return say_json(&json!({
-            "cameras": cameras.iter().map(camera_as_json).collect::<Vec<_>>(),
-            "serial_ports": ports.iter().map(port_as_json).collect::<Vec<_>>(),
+            "cameras": list_as_json(&cameras, camera_as_json),
+            "serial_ports": list_as_json(&ports, port_as_json),
         }));
     }
-    say(&(cameras_as_text(&cameras) + &ports_as_text(&ports)))
+    let line = |error: String| error + "\n";
+    let cameras = cameras.map_or_else(line, |cameras| cameras_as_text(&cameras));
+    say(&(cameras + &ports.map_or_else(line, |ports| ports_as_text(&ports))))
+}
+
+/// A list, or why there is none.
+fn list_as_json<T>(list: &Result<Vec<T>, String>, one: fn(&T) -> Value) -> Value {
+    match list {
+        Ok(all) => all.iter().map(one).collect(),
+        Err(error) => json!({ "error": error }),
+    }
 }
 
 fn ports_as_text(ports: &[SerialPort]) -> String {
@@ -184,5 +198,7 @@ mod tests {
         let port = SerialPort { path: "/dev/ttyS0".into(), usb: None };
         assert_eq!(ports_as_text(std::slice::from_ref(&port)), "/dev/ttyS0  not on USB\n");
         assert_eq!(port_as_json(&port)["is_taken_by_auto"], false);
+        assert_eq!(list_as_json(&Ok(vec![port]), port_as_json)[0]["port"], "/dev/ttyS0");
+        assert_eq!(list_as_json(&Err("no bus".into()), port_as_json)["error"], "no bus");
     }
 }

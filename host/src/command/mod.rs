@@ -109,7 +109,7 @@ impl Cli {
             Command::Replay(args) => replay::run(args),
             Command::Capture(args) => capture::run(args),
             Command::ListDevices(args) => told(args.json, list_devices::run(args)),
-            Command::Calibrate(args) => told(args.json, calibrate::run(args)),
+            Command::Calibrate(args) => calibrate::run(args),
             Command::Listen(args) => told_in_line(args.json, listen::run(args)),
             Command::Device(args) => told(args.json, device::run(args)),
             Command::Demo(args) => told(args.json, demo::run(args)),

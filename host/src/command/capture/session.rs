@@ -124,16 +124,12 @@ impl<'a> Session<'a> {
     fn take(&mut self, live: Live, tally: &Tally) -> ControlFlow<()> {
         if self.skip > 0 {
             self.skip -= 1;
-            return ControlFlow::Continue(());
+        } else if let Err(failure) = self.work_on(live) {
+            self.failure = Some(failure);
+            return ControlFlow::Break(());
+        } else {
+            self.show(tally);
         }
-        match self.work_on(live) {
-            Ok(()) => {}
-            Err(failure) => {
-                self.failure = Some(failure);
-                return ControlFlow::Break(());
-            }
-        }
-        self.show(tally);
         let enough = self.args.frames.is_some_and(|frames| self.done.len() as u64 >= frames)
             || self.args.seconds.is_some_and(|seconds| self.begun.elapsed().as_secs_f64() >= seconds);
         if enough { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
@@ -216,8 +212,19 @@ impl<'a> Session<'a> {
         Ok(Some((self.done[best.index].name.clone(), model)))
     }
 
-    /// That pairs came, but no model, is a failure.
+    /// That no pair was worked on is a failure, and that none of them gave a model.
     fn nothing(&self) -> Option<Failure> {
+        if self.done.is_empty() {
+            let taken = if self.skip > 0 {
+                let skip = self.args.skip;
+                format!("while the first {skip} were thrown away; let it run longer, or take a lower --skip")
+            } else if self.scene.background.is_some() && self.args.scene.takes_first() {
+                "after the background; put the object in its place and let it run longer".into()
+            } else {
+                "before the end; let it run longer".into()
+            };
+            return Some(format!("no pair came that could be worked on: the run ended {taken}").into());
+        }
         let mut refused = self.done.iter().map(|done| done.result.as_ref().err());
         let last = refused.clone().next_back()??;
         refused.all(|refusal| refusal.is_some()).then(|| {

@@ -58,9 +58,9 @@ fn rig(script: Vec<Event>) -> Rig<Simulated> {
 /// Runs `capture` on what a camera sends; the folder is made to be the results' and the recording's.
 fn capture(folder: &Path, script: Vec<Vec<u8>>, more: &[&str]) -> Result<(), String> {
     let [out, record] = ["models", "recording"].map(|name| folder.join(name).display().to_string());
-    let fixed =
-        ["capture", "--device", "x", "--no-pictures", "--skip", "0", "--out", &out, "--record", &record];
-    let Line { args } = Line::try_parse_from(fixed.iter().chain(more)).unwrap();
+    let skip = if more.contains(&"--skip") { &[][..] } else { &["--skip", "0"] };
+    let fixed = ["capture", "--device", "x", "--no-pictures", "--out", &out, "--record", &record];
+    let Line { args } = Line::try_parse_from(fixed.iter().chain(skip).chain(more)).unwrap();
     let mut options = args.method.options().unwrap();
     let scene = args.scene.scene(None, false, &mut options).unwrap();
     let rig =
@@ -169,4 +169,18 @@ fn nothing_but_refusals_is_a_failure_with_the_last() {
     let error = capture(folder.path(), vec![empty(); 3], &more).unwrap_err();
     assert!(error.contains("none of 2 pairs gave a model") && error.contains("no object"), "{error}");
     assert!(!folder.path().join("models").exists());
+}
+
+#[test]
+fn a_run_without_a_pair_is_a_failure() {
+    let folder = tempfile::tempdir().unwrap();
+    // The time is over while pairs are still thrown away.
+    let more = ["--focal", "375", "--baseline", "60", "--skip", "9", "--seconds", "0.001"];
+    let error = capture(folder.path(), vec![both_eyes(1); 2], &more).unwrap_err();
+    assert!(error.contains("no pair came") && error.contains("lower --skip"), "{error}");
+    assert!(!folder.path().join("models").exists());
+    let folder = tempfile::tempdir().unwrap();
+    let more = ["--focal", "375", "--baseline", "60", "--background", "first", "--seconds", "0.001"];
+    let error = capture(folder.path(), vec![empty(); 2], &more).unwrap_err();
+    assert!(error.contains("no pair came") && error.contains("after the background"), "{error}");
 }
