@@ -73,7 +73,7 @@ add_module vivid
 add_program busybox
 add_program v4l2-ctl
 add_program "$HOST" host
-cp -r "$WORK" "$ROOT/work"
+cp -r "$WORK" "$ROOT/job"
 cp "$INIT" "$ROOT/init"
 (cd "$ROOT" && find . | busybox cpio -o -H newc 2>/dev/null) >"$OUT/initramfs"
 rm -rf "$ROOT"
