@@ -10,7 +10,7 @@ use image::RgbImage;
 const BAR: f64 = 2.0;
 const HIGH: f64 = 240.0;
 
-/// A histogram a view, beside each other. Bars grow with the root of the count, or an object that is small
+/// A histogram a view, beside each other. Bars grow with the logarithm of the count, or an object that is small
 /// before its background would not be seen.
 pub(super) fn histograms(views: &[Seen<'_>]) -> RgbImage {
     let wide = 256.0 * BAR;
@@ -24,7 +24,7 @@ pub(super) fn histograms(views: &[Seen<'_>]) -> RgbImage {
         let base = f64::from(HEAD) + HIGH;
         let most = view.parts.histogram.iter().copied().max().unwrap_or(0).max(1);
         for (grey, count) in (0u16..).zip(&view.parts.histogram) {
-            let height = (f64::from(*count) / f64::from(most)).sqrt() * HIGH;
+            let height = f64::from(*count).ln_1p() / f64::from(most).ln_1p() * HIGH;
             let corner = Place::new(left + BAR * f64::from(grey), base - height);
             canvas.fill(corner, Place::new(BAR, height), FAINT);
         }
