@@ -7,7 +7,7 @@
 use heapless::Vec;
 use shared::arena;
 use shared::bitmap::{Size, Word};
-use shared::pipeline::{Branch, EyeMemory, Memory, outline_words, scratch_words};
+use shared::pipeline::{Branch, EyeMemory, Kernels, Memory, outline_words, scratch_words};
 use shared::point::{Pixel, PixelPoint};
 use shared::stage::branch::Sample;
 use shared::stage::contour::{ContourLoop, ContourPoint};
@@ -113,6 +113,7 @@ macro_rules! storage {
                     boundary_pairs,
                     skeleton_pairs,
                     scratch: &mut self.scratch,
+kernels: Kernels::PORTABLE,
                 }
             }
         }

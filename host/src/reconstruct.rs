@@ -29,7 +29,7 @@ use options::core_settings;
 use shared::bitmap::{Grey, Size};
 use shared::camera::PairModel;
 use shared::fixed::PX;
-use shared::pipeline::{self, Finding, Memory, Observer, Outcome, Settings, Side, scratch_words};
+use shared::pipeline::{self, Finding, Kernels, Memory, Observer, Outcome, Settings, Side, scratch_words};
 use shared::stage::depth::Optics;
 use std::time::{Duration, Instant};
 
@@ -241,7 +241,7 @@ fn object_box(image: &GrayImage, side: Side, settings: &Settings) -> Result<Pixe
     let grey = grey(image)?;
     let size = grey.size();
     let (mut mask, mut scratch) = (vec![0; size.words()], vec![0; scratch_words(size, 0, 0, 0)]);
-    let found = pipeline::object_box(side, grey, (&mut mask, &mut scratch), settings)?;
+    let found = pipeline::object_box(side, grey, (&mut mask, &mut scratch), (settings, &Kernels::PORTABLE))?;
     let corner = |p: shared::point::Pixel| Point2::new(f64::from(p.u), f64::from(p.v));
     Ok(PixelBox { min: corner(found.min), max: corner(found.max) })
 }

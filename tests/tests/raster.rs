@@ -251,7 +251,9 @@ fn medians() {
         let (size, stride) = (Size::new(width, rows.len()).unwrap(), width + 3);
         let data: Vec<u8> = rows.iter().flat_map(|r| r.iter().copied().chain([255; 3])).collect();
         let mut buffer = vec![1; size.pixels()];
-        let median = binarise::median(Grey::new(size, stride, &data).unwrap(), &mut buffer).unwrap();
+        let median =
+            binarise::median(Grey::new(size, stride, &data).unwrap(), &mut buffer, binarise::median_row)
+                .unwrap();
         let got: Vec<Vec<u8>> = (0..size.height).map(|v| median.row(v).to_vec()).collect();
         assert_eq!(got, naive::median(&rows));
     }
@@ -414,7 +416,7 @@ fn too_little_memory_is_an_error() {
         thinning::thin(b, Rule::EdtOrdered, &plane, Arena::new(&mut block)).unwrap();
     });
     let grey = Grey::new(size, size.width, &[0; 4800]).unwrap();
-    refused(binarise::median(grey, &mut [0; 4799]).map(drop));
+    refused(binarise::median(grey, &mut [0; 4799], binarise::median_row).map(drop));
     refused(binarise::binarise(grey, 0, Tone::Bright, &mut [0; 3]).map(drop));
 }
 

@@ -1,7 +1,7 @@
 //! One eye, in two steps: from its picture to mask and contour, from the mask to its pruned skeleton.
 
 use super::finding::{Gates, MAX_COVER, MIN_AREA, MIN_CONTRAST, MIN_HEIGHT, SECOND_COVER};
-use super::{Branch, EyeMemory, Finding, Method, Observer, Product, Settings, Side};
+use super::{Branch, EyeMemory, Finding, Kernels, Method, Observer, Product, Settings, Side};
 use crate::arena::Arena;
 use crate::bitmap::{Bitmap, Grey, PixelBox, Size, Word};
 use crate::fixed::{ONE, PX};
@@ -37,7 +37,7 @@ pub(super) fn outline(
     grey: Grey<'_>,
     eye: &mut EyeMemory<'_>,
     mut scratch: Arena<'_>,
-    settings: &Settings,
+    (settings, kernels): (&Settings, &Kernels),
     gates: &mut Gates,
     observer: &mut impl Observer,
 ) -> Result<EyeFigures, Finding> {
@@ -45,7 +45,7 @@ pub(super) fn outline(
     let mut saw = |product: Product<'_>| observer.saw(Some(side), product);
     let filtered = filtered(size, settings, &mut scratch)?;
     let (grey, mask) =
-        silhouette(side, grey, (eye.mask, filtered, scratch.fork()), settings, gates, &mut saw)?;
+        silhouette(side, grey, (eye.mask, filtered, scratch.fork()), (settings, kernels), gates, &mut saw)?;
     let area = mask.count() as u32;
 
     saw(Product::Boundary(&boundary(&mask, Element::Square, scratch.fork().take(size.words(), WORDS)?)?));
@@ -125,13 +125,13 @@ fn silhouette<'a>(
     side: Side,
     grey: Grey<'a>,
     (mask, filtered, mut scratch): (&'a mut [Word], &'a mut [u8], Arena<'_>),
-    settings: &Settings,
+    (settings, kernels): (&Settings, &Kernels),
     gates: &mut Gates,
     saw: &mut impl FnMut(Product<'_>),
 ) -> Result<(Grey<'a>, Bitmap<'a>), Finding> {
     let size = grey.size();
     let pixels = size.pixels() as u32;
-    let grey = if settings.median { binarise::median(grey, filtered)? } else { grey };
+    let grey = if settings.median { binarise::median(grey, filtered, kernels.median_row)? } else { grey };
     let histogram = binarise::histogram(grey);
     let level = settings.threshold.level(&histogram);
     let tone = settings.polarity.tone(grey, level);
@@ -168,11 +168,12 @@ pub fn object_box(
     side: Side,
     grey: Grey<'_>,
     (mask, scratch): (&mut [Word], &mut [u64]),
-    settings: &Settings,
+    (settings, kernels): (&Settings, &Kernels),
 ) -> Result<PixelBox, Finding> {
     let (mut gates, mut scratch) = (Gates::new(settings), Arena::new(scratch));
     let filtered = filtered(grey.size(), settings, &mut scratch)?;
-    let (_, mask) = silhouette(side, grey, (mask, filtered, scratch), settings, &mut gates, &mut |_| ())?;
+    let (_, mask) =
+        silhouette(side, grey, (mask, filtered, scratch), (settings, kernels), &mut gates, &mut |_| ())?;
     mask.bounds().ok_or(Finding::NoObject(side, 0))
 }
 

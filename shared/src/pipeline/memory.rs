@@ -1,5 +1,6 @@
 //! What a run borrows: memory of any size, named once.
 
+use super::Kernels;
 use crate::arena;
 use crate::bitmap::{Size, Word};
 use crate::point::PixelPoint;
@@ -75,6 +76,8 @@ pub struct Memory<'a> {
     pub skeleton_pairs: &'a mut VecView<Pair>,
     /// What passes: [`scratch_words`].
     pub scratch: &'a mut [u64],
+    /// How this machine runs the inner loops.
+    pub kernels: Kernels,
 }
 
 /// Words of scratch that pictures of a size need, if a contour has up to `points` points and a curve up to

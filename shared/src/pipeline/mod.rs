@@ -17,6 +17,7 @@
 mod default;
 mod eye;
 mod finding;
+mod kernels;
 mod memory;
 mod observer;
 mod paper;
@@ -24,6 +25,7 @@ mod resume;
 
 pub use eye::object_box;
 pub use finding::{Finding, MAX_COVER};
+pub use kernels::Kernels;
 pub use memory::{Branch, EyeMemory, Memory, outline_words, scratch_words};
 pub use observer::{Observer, Product};
 pub use paper::PAPER_VERTICES;
@@ -176,6 +178,7 @@ pub fn run(
 #[derive(Debug)]
 pub struct Run {
     settings: Settings,
+    kernels: Kernels,
     gates: Gates,
     figures: [Option<EyeFigures>; 2],
 }
@@ -184,7 +187,8 @@ impl Run {
     /// A new run, which forgets what an earlier one left in the memory.
     pub fn new(memory: &mut Memory<'_>, settings: &Settings) -> Self {
         memory.clear();
-        Self { settings: *settings, gates: Gates::new(settings), figures: [None; 2] }
+        let (kernels, gates) = (memory.kernels, Gates::new(settings));
+        Self { settings: *settings, kernels, gates, figures: [None; 2] }
     }
 
     /// From an eye's picture to mask and contour. The picture is not needed any more after this.
@@ -199,7 +203,8 @@ impl Run {
         scratch: Arena<'_>,
         observer: &mut impl Observer,
     ) -> Result<(), Finding> {
-        let figures = eye::outline(side, grey, eye, scratch, &self.settings, &mut self.gates, observer)?;
+        let Self { settings, kernels, gates, .. } = self;
+        let figures = eye::outline(side, grey, eye, scratch, (settings, kernels), gates, observer)?;
         self.figures[side as usize] = Some(figures);
         Ok(())
     }

@@ -90,6 +90,9 @@ fn opposite_of_border(grey: Grey<'_>, level: u8) -> Tone {
     if bright > dark { Tone::Dark } else { Tone::Bright }
 }
 
+/// A function like [`median_row`].
+pub type MedianRow = fn(&[u8], &[u8], &[u8], &mut [u8]);
+
 /// The 3x3 median of a row from the three input rows around it; beyond its ends the row repeats its
 /// outermost pixels. Fills as many pixels as the shortest of the four slices has.
 pub fn median_row(above: &[u8], here: &[u8], below: &[u8], out: &mut [u8]) {
@@ -118,8 +121,13 @@ fn sorted(a: u8, b: u8, c: u8) -> [u8; 3] {
     [low.min(c), low.max(high.min(c)), high.max(c)]
 }
 
-/// The 3x3 median of an image, in `buffer`, of which it takes the first width x height bytes.
-pub fn median<'b>(grey: Grey<'_>, buffer: &'b mut [u8]) -> Result<Grey<'b>, CapacityError> {
+/// The 3x3 median of an image, by `median_row`, in `buffer`, of which it takes the first width x height
+/// bytes.
+pub fn median<'b>(
+    grey: Grey<'_>,
+    buffer: &'b mut [u8],
+    median_row: MedianRow,
+) -> Result<Grey<'b>, CapacityError> {
     let size = grey.size();
     let limit = buffer.len();
     let out =

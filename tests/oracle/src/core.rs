@@ -3,7 +3,7 @@
 use heapless::Vec as List;
 use shared::bitmap::{Grey, Size, Word};
 use shared::pipeline::{
-    self, Branch, EyeMemory, Finding, Memory, Observer, Outcome, Settings, scratch_words,
+    self, Branch, EyeMemory, Finding, Kernels, Memory, Observer, Outcome, Settings, scratch_words,
 };
 use shared::point::{Pixel, PixelPoint};
 use shared::stage::branch::Sample;
@@ -134,6 +134,7 @@ impl Core {
             boundary_pairs: list!("boundary pairs", long.boundary_pairs, short.boundary_pairs),
             skeleton_pairs: list!("skeleton pairs", long.skeleton_pairs, short.skeleton_pairs),
             scratch: slice!("scratch", slices.scratch),
+            kernels: Kernels::PORTABLE,
         }
     }
 
