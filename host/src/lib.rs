@@ -13,6 +13,8 @@ pub mod reconstruct;
 
 // What comes out.
 pub mod mesh;
+pub mod curves;
+pub mod geometry;
 pub mod export;
 pub mod report;
 pub mod output;

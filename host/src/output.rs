@@ -15,8 +15,8 @@
 //! one run; files of other names are not touched.
 
 use crate::export::ExportError;
-use crate::export::ply::{self, Points};
-use crate::reconstruct::{Curves, Reconstruction};
+use crate::export::ply;
+use crate::reconstruct::Reconstruction;
 use crate::report::{Run, numbers, pictures};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{GrayImage, RgbImage};
@@ -120,7 +120,7 @@ impl Stage<'_> {
         let comments = ["Ossature", "unit mm", "axes of the left camera: x right, y down, z forward"];
         self.named("model.ply", |path| ply::write_mesh(path, &made.mesh, &comments))?;
         for (name, curves) in [("skeleton.ply", &made.skeleton), ("boundary.ply", &made.boundary)] {
-            self.named(name, |path| write_curves(path, curves, &comments))?;
+            self.named(name, |path| ply::write_curves(path, curves, &comments))?;
         }
         Ok(["model.ply", "skeleton.ply", "boundary.ply"].map(String::from).to_vec())
     }
@@ -189,16 +189,6 @@ pub(crate) fn grey_png(picture: &GrayImage) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     picture.write_with_encoder(PngEncoder::new(&mut bytes)).map_err(io::Error::other)?;
     Ok(bytes)
-}
-
-fn write_curves(path: &Path, curves: &Curves, comments: &[&str]) -> Result<(), ExportError> {
-    let radius = [("radius", &curves.radii[..])];
-    let points = Points {
-        positions: &curves.points,
-        scalars: if curves.radii.is_empty() { &[] } else { &radius },
-        edges: &curves.edges,
-    };
-    ply::write_points(path, &points, comments)
 }
 
 #[cfg(test)]

@@ -17,6 +17,7 @@ pub(crate) use options::settings;
 pub use options::{Mode, Options, Pieces, Profile, Radius, Skeleton};
 
 use crate::calibration::StereoCamera;
+use crate::curves::Curves;
 use crate::memory::Storage;
 use crate::mesh::Mesh;
 use crate::mesh::body::keep_largest_body;
@@ -35,17 +36,6 @@ use std::time::{Duration, Instant};
 
 /// Cells along the diagonal of a mesh at most, unless the user says otherwise.
 const MAX_CELLS: f64 = 300.0;
-
-/// A curve or a set of points in space.
-#[derive(Clone, Debug, Default)]
-pub struct Curves {
-    /// Points, left camera's axes, mm.
-    pub points: Vec<Point3<f64>>,
-    /// Radius of the solid at each point, mm; empty where it has no meaning.
-    pub radii: Vec<f64>,
-    /// Neighbouring points.
-    pub edges: Vec<[u32; 2]>,
-}
 
 /// What became of a pair.
 #[derive(Clone, Debug)]

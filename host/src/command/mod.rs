@@ -9,6 +9,7 @@
 //!   host listen --calib calib.yaml          models from a camera device
 //!   host render mesh.obj --out pair         a pair of any mesh that you have
 //!   host evaluate model.ply truth.ply       how far a model is from the truth
+//!   host convert model.ply model.glb        other formats: STL, OBJ, GLB, SWC
 //!   host list-devices                       cameras and boards that are plugged in
 //!   host capture --device /dev/video0 --calib calib.yaml
 //!   host experiments                        the paper's experiments, rerun
@@ -27,6 +28,7 @@ pub mod list_devices;
 pub mod listen;
 mod batch;
 mod connect;
+pub mod convert;
 mod model;
 pub mod options;
 pub mod render;
@@ -87,6 +89,9 @@ enum Command {
     /// How far a model is from the truth
     #[command(long_about = page(include_str!("evaluate.rs")))]
     Evaluate(evaluate::Args),
+    /// A model or a skeleton in another format
+    #[command(long_about = page(include_str!("convert.rs")))]
+    Convert(convert::Args),
     /// The paper's experiments on built-in shapes
     #[command(long_about = page(include_str!("experiments.rs")))]
     Experiments(experiments::Args),
@@ -115,6 +120,7 @@ impl Cli {
             Command::Demo(args) => told(args.json, demo::run(args)),
             Command::Render(args) => render::run(args),
             Command::Evaluate(args) => told(args.json, evaluate::run(args)),
+            Command::Convert(args) => told(args.json, convert::run(args)),
             Command::Experiments(args) => told(args.json, experiments::run(args)),
             Command::Inspect(args) => told(args.json, inspect::run(args)),
             Command::Completions(args) => completions::run(args),

@@ -1,12 +1,18 @@
 //! What leaves the program as files.
 //!
-//! * [`ply`]: meshes (`mesh.ply`), point clouds and curves (`boundary.ply`, `skeleton.ply`) as binary
+//! * [`ply`]: meshes (`model.ply`), point clouds and curves (`boundary.ply`, `skeleton.ply`) as binary
 //!   little-endian PLY, which every mesh viewer reads.
+//! * [`stl`]: meshes for printing; [`obj`]: meshes and curves for modelling; [`glb`]: both for showing.
+//! * [`swc`]: skeletons for those who study trees and neurons.
 //!
-//! Lengths are millimetres in the left camera's axes. A file is written beside its final name and renamed
+//! Lengths are millimetres in the left camera's axes, but in [`glb`], which says metres. A file is written beside its final name and renamed
 //! when it is complete, so that nothing half-written ever stands under that name.
 
+pub mod glb;
+pub mod obj;
 pub mod ply;
+pub mod stl;
+pub mod swc;
 
 use std::{
     io::{self, BufWriter, Write},
@@ -14,6 +20,11 @@ use std::{
 };
 
 use thiserror::Error;
+
+use crate::geometry::Geometry;
+
+/// What a file says of itself, in whatever place its format has for it.
+const TITLE: &str = "Ossature; unit mm; axes of the left camera: x right, y down, z forward";
 
 /// Why a file was not written.
 #[derive(Debug, Error)]
@@ -34,6 +45,38 @@ pub enum ExportError {
         /// The contradiction.
         what: String,
     },
+}
+
+/// Writes a geometry in the format that the file's extension names: `ply`, `stl`, `obj`, `glb` or `swc`.
+///
+/// # Errors
+///
+/// If the extension is none of these, the format cannot hold this geometry, or the file cannot be written.
+pub fn write(path: &Path, geometry: &Geometry) -> Result<(), ExportError> {
+    let extension = path.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase);
+    let refuse = |what: &str| Err(ExportError::Content { path: path.to_path_buf(), what: what.to_owned() });
+    match (extension.as_deref(), geometry) {
+        (Some("ply"), Geometry::Mesh(mesh)) => ply::write_mesh(path, mesh, &[TITLE]),
+        (Some("ply"), Geometry::Curves(curves)) => ply::write_curves(path, curves, &[TITLE]),
+        (Some("stl"), Geometry::Mesh(mesh)) => stl::write_mesh(path, mesh),
+        (Some("stl"), Geometry::Curves(_)) => {
+            refuse("STL holds triangles alone; curves go into .ply, .obj, .glb or .swc")
+        }
+        (Some("obj"), Geometry::Mesh(mesh)) => obj::write_mesh(path, mesh),
+        (Some("obj"), Geometry::Curves(curves)) => obj::write_curves(path, curves),
+        (Some("glb"), Geometry::Mesh(mesh)) => glb::write_mesh(path, mesh),
+        (Some("glb"), Geometry::Curves(curves)) => glb::write_curves(path, curves),
+        (Some("swc"), Geometry::Curves(curves)) => swc::write_curves(path, curves),
+        (Some("swc"), Geometry::Mesh(_)) => {
+            refuse("SWC holds skeletons alone; meshes go into .ply, .stl, .obj or .glb")
+        }
+        _ => refuse("its name must end in .ply, .stl, .obj, .glb or .swc"),
+    }
+}
+
+/// Creates or replaces the file `path` by `bytes`, all or nothing.
+fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), ExportError> {
+    write_whole(path, |file| file.write_all(bytes))
 }
 
 /// Creates or replaces the file `path` by what `write` writes, all or nothing.

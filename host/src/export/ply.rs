@@ -12,6 +12,7 @@ use std::{
 use nalgebra::Point3;
 
 use super::{ExportError, write_whole};
+use crate::curves::Curves;
 use crate::mesh::Mesh;
 
 /// Points with what is known at each, and the edges between them if they are a curve.
@@ -80,6 +81,21 @@ pub fn write_points(path: &Path, points: &Points, comments: &[&str]) -> Result<(
         }
         points.edges.iter().try_for_each(|edge| indices(file, edge))
     })
+}
+
+/// Writes curves, with `radius` where they have one. `comments` go to the header, a line each.
+///
+/// # Errors
+///
+/// As [`write_points`].
+pub fn write_curves(path: &Path, curves: &Curves, comments: &[&str]) -> Result<(), ExportError> {
+    let radius = [("radius", &curves.radii[..])];
+    let points = Points {
+        positions: &curves.points,
+        scalars: if curves.radii.is_empty() { &[] } else { &radius },
+        edges: &curves.edges,
+    };
+    write_points(path, &points, comments)
 }
 
 /// Refuses what the header or an int32 cannot say, and indices that lead nowhere.

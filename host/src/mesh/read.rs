@@ -1,4 +1,4 @@
-//! Meshes from files: PLY, OBJ and STL, told apart by their extension.
+//! Meshes from files: PLY, OBJ and STL, told apart by their extension; and curves from PLY.
 //!
 //! Polygons become fans of triangles around their first corner. No bytes cause a panic, and no header
 //! makes the reader allocate more than the file's own size warrants.
@@ -15,6 +15,7 @@ use std::{
 use thiserror::Error;
 
 use super::Mesh;
+use crate::geometry::Geometry;
 
 /// The largest file that is read, bytes: about ten times a binary mesh of a million faces.
 const MAX_BYTES: u64 = 1 << 28;
@@ -58,11 +59,25 @@ pub enum ReadError {
 ///
 /// See [`ReadError`]; a mesh without vertices or faces is refused too.
 pub fn read(path: &Path) -> Result<Mesh, ReadError> {
+    match read_geometry(path)? {
+        Geometry::Mesh(mesh) => Ok(mesh),
+        Geometry::Curves(_) => {
+            Err(ReadError::Content { path: path.to_path_buf(), what: "it has no faces".into() })
+        }
+    }
+}
+
+/// Reads the mesh in the file `path`, or the curves of a PLY file without faces.
+///
+/// # Errors
+///
+/// As [`read`].
+pub fn read_geometry(path: &Path) -> Result<Geometry, ReadError> {
     let extension = path.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase);
     let parse = match extension.as_deref() {
         Some("ply") => ply::parse,
-        Some("obj") => obj::parse,
-        Some("stl") => stl::parse,
+        Some("obj") => |bytes: &[u8]| obj::parse(bytes).map(Geometry::Mesh),
+        Some("stl") => |bytes: &[u8]| stl::parse(bytes).map(Geometry::Mesh),
         _ => return Err(ReadError::Extension { path: path.to_path_buf() }),
     };
     let bytes = bytes_of(path).map_err(|source| ReadError::Io { path: path.to_path_buf(), source })?;
@@ -79,17 +94,18 @@ fn bytes_of(path: &Path) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-fn sound(mesh: Mesh) -> Result<Mesh, String> {
-    if mesh.faces.is_empty() {
-        return Err("it has no faces".into());
-    }
-    if let Some(vertex) = mesh.vertices.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
+fn sound(geometry: Geometry) -> Result<Geometry, String> {
+    let (points, elements, element) = match &geometry {
+        Geometry::Mesh(mesh) if mesh.faces.is_empty() => return Err("it has no faces".into()),
+        Geometry::Mesh(mesh) => (&mesh.vertices, mesh.faces.as_flattened(), "triangle"),
+        Geometry::Curves(curves) => (&curves.points, curves.edges.as_flattened(), "edge"),
+    };
+    if let Some(vertex) = points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
         return Err(format!("a coordinate of vertex {vertex} is not a finite number"));
     }
-    let count = mesh.vertices.len();
-    match mesh.faces.iter().position(|face| face.iter().any(|&corner| corner as usize >= count)) {
-        Some(face) => Err(format!("triangle {face} names a vertex that is not there")),
-        None => Ok(mesh),
+    match elements.iter().find(|&&corner| corner as usize >= points.len()) {
+        Some(corner) => Err(format!("a {element} names vertex {corner}, which is not there")),
+        None => Ok(geometry),
     }
 }
 
@@ -119,7 +135,7 @@ mod tests {
     fn coordinates_must_be_finite() {
         for x in ["nan", "inf", "1e999"] {
             let text = format!("v {x} 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
-            assert!(obj::parse(text.as_bytes()).and_then(sound).is_err(), "{x}");
+            assert!(obj::parse(text.as_bytes()).map(Geometry::Mesh).and_then(sound).is_err(), "{x}");
         }
     }
 }

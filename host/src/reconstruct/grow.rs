@@ -3,7 +3,8 @@
 //! * **In**: what the core says of an object ([`Described`]), whether it ran here or on a device, and the
 //!   rectified cameras. **Out**: round cones and curves in rectified axes, mm.
 
-use super::{Clock, Curves, Grown, Options, Pieces, Profile, Radius, Skeleton};
+use super::{Clock, Grown, Options, Pieces, Profile, Radius, Skeleton};
+use crate::curves::Curves;
 use crate::stage::balls::{self, Ball, Edge, boundary_rays, distance_to_points, distance_to_rays, px2};
 use crate::stage::curve::curve_balls;
 use crate::stage::rectify::RectifiedCamera;

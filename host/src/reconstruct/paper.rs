@@ -1,6 +1,7 @@
 //! The paper's solid.
 
-use super::{Curves, Grown};
+use super::Grown;
+use crate::curves::Curves;
 use crate::stage::balls::{distance_to_points, px2};
 use crate::stage::rectify::RectifiedCamera;
 use crate::stage::solid::{SolidBall, outermost, spheres};

@@ -1,19 +1,21 @@
 //! PLY (G. Turk, "The PLY Polygon File Format", 1994): ascii and binary, either byte order, with any
-//! elements and properties around the `x y z` of `vertex` and the list of `face`, which are all that is
-//! kept.
+//! elements and properties around the `x y z` and `radius` of `vertex`, the list of `face` and the ends of
+//! `edge`, which are all that is kept.
 
 use std::str::SplitAsciiWhitespace;
 
 use nalgebra::Point3;
 
+use crate::curves::Curves;
+use crate::geometry::Geometry;
 use crate::mesh::Mesh;
 
-/// The mesh in the bytes of a PLY file.
+/// The mesh in the bytes of a PLY file, or its curves if it has no element `face`.
 ///
 /// # Errors
 ///
 /// What is wrong.
-pub(super) fn parse(bytes: &[u8]) -> Result<Mesh, String> {
+pub(super) fn parse(bytes: &[u8]) -> Result<Geometry, String> {
     let (header, body) = Header::parse(bytes)?;
     let mut values = match header.format {
         Format::Ascii => {
@@ -23,13 +25,26 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Mesh, String> {
         Format::LittleEndian => Values::Binary { rest: body, little: true },
         Format::BigEndian => Values::Binary { rest: body, little: false },
     };
-    let mut mesh = Mesh::default();
+    let mut kept = Kept::default();
     for element in &header.elements {
         element
-            .read(&mut values, &mut mesh)
+            .read(&mut values, &mut kept)
             .map_err(|what| format!("in element {}: {what}", element.name))?;
     }
-    Ok(mesh)
+    let Kept { points, radii, edges, faces } = kept;
+    if header.elements.iter().any(|element| element.name == "face") {
+        return Ok(Geometry::Mesh(Mesh { vertices: points, faces }));
+    }
+    Ok(Geometry::Curves(Curves { points, radii, edges }))
+}
+
+/// What is kept of the elements.
+#[derive(Default)]
+struct Kept {
+    points: Vec<Point3<f64>>,
+    radii: Vec<f64>,
+    edges: Vec<[u32; 2]>,
+    faces: Vec<[u32; 3]>,
 }
 
 enum Format {
@@ -147,27 +162,31 @@ fn parse_property(mut words: SplitAsciiWhitespace) -> Result<Property, String> {
 }
 
 impl Element {
-    /// Reads all its instances and keeps vertices and faces. What is kept grows with what has been read,
+    /// Reads all its instances and keeps vertices, edges and faces. What is kept grows with what has been read,
     /// not with the count, which may lie.
-    fn read(&self, values: &mut Values, mesh: &mut Mesh) -> Result<(), String> {
+    fn read(&self, values: &mut Values, kept: &mut Kept) -> Result<(), String> {
         if self.properties.is_empty() {
             return Ok(());
         }
         match self.name.as_str() {
-            "vertex" => self.read_vertices(values, mesh),
-            "face" => self.read_faces(values, mesh),
+            "vertex" => self.read_vertices(values, kept),
+            "edge" => self.read_edges(values, kept),
+            "face" => self.read_faces(values, kept),
             _ => (0..self.count).try_for_each(|_| {
                 self.properties.iter().try_for_each(|property| property.read(values, |_| {}))
             }),
         }
     }
 
-    fn read_vertices(&self, values: &mut Values, mesh: &mut Mesh) -> Result<(), String> {
-        let place = |name: &str| {
-            let found = self.properties.iter().position(|p| p.name == name && p.length.is_none());
-            found.ok_or_else(|| format!("there is no property {name}"))
-        };
-        let axes = [place("x")?, place("y")?, place("z")?];
+    /// Where a property of one value stands.
+    fn place(&self, name: &str) -> Result<usize, String> {
+        let found = self.properties.iter().position(|p| p.name == name && p.length.is_none());
+        found.ok_or_else(|| format!("there is no property {name}"))
+    }
+
+    fn read_vertices(&self, values: &mut Values, kept: &mut Kept) -> Result<(), String> {
+        let axes = [self.place("x")?, self.place("y")?, self.place("z")?];
+        let radius = self.place("radius").ok();
         for _ in 0..self.count {
             let mut vertex = Point3::origin();
             for (i, property) in self.properties.iter().enumerate() {
@@ -175,15 +194,33 @@ impl Element {
                 property.read(values, |value| {
                     if let Some(axis) = axis {
                         vertex[axis] = value;
+                    } else if radius == Some(i) {
+                        kept.radii.push(value);
                     }
                 })?;
             }
-            mesh.vertices.push(vertex);
+            kept.points.push(vertex);
         }
         Ok(())
     }
 
-    fn read_faces(&self, values: &mut Values, mesh: &mut Mesh) -> Result<(), String> {
+    fn read_edges(&self, values: &mut Values, kept: &mut Kept) -> Result<(), String> {
+        let ends = [self.place("vertex1")?, self.place("vertex2")?];
+        for _ in 0..self.count {
+            let mut edge = [0; 2];
+            for (i, property) in self.properties.iter().enumerate() {
+                let mut last = 0.0;
+                property.read(values, |value| last = value)?;
+                if let Some(end) = ends.iter().position(|&end| end == i) {
+                    edge[end] = index(last).ok_or_else(|| format!("an edge has the end {last}"))?;
+                }
+            }
+            kept.edges.push(edge);
+        }
+        Ok(())
+    }
+
+    fn read_faces(&self, values: &mut Values, kept: &mut Kept) -> Result<(), String> {
         let is_corners =
             |p: &Property| p.length.is_some() && ["vertex_indices", "vertex_index"].contains(&&*p.name);
         let corners_at =
@@ -198,17 +235,22 @@ impl Element {
                     }
                 })?;
             }
-            if corners.iter().any(|&x| x < 0.0 || x > f64::from(u32::MAX) || x.fract() != 0.0) {
+            if corners.iter().any(|&x| index(x).is_none()) {
                 return Err(format!("a face has the corners {corners:?}"));
             }
             if corners.len() < 3 {
                 return Err(format!("a face has {} corners", corners.len()));
             }
             let first = corners[0] as u32;
-            mesh.faces.extend(corners[1..].windows(2).map(|pair| [first, pair[0] as u32, pair[1] as u32]));
+            kept.faces.extend(corners[1..].windows(2).map(|pair| [first, pair[0] as u32, pair[1] as u32]));
         }
         Ok(())
     }
+}
+
+/// A value as an index, if it is one.
+fn index(value: f64) -> Option<u32> {
+    (value >= 0.0 && value <= f64::from(u32::MAX) && value.fract() == 0.0).then_some(value as u32)
 }
 
 impl Property {
@@ -313,14 +355,15 @@ mod tests {
 
     #[test]
     fn the_three_formats_give_the_same_mesh() {
-        let mesh = parse(&ascii()).unwrap();
+        let parsed = parse(&ascii()).unwrap();
+        let Geometry::Mesh(mesh) = &parsed else { panic!("{parsed:?}") };
         assert_eq!(
             mesh.vertices,
             [[0.0, 0.0, 5.0], [1.0, 0.0, 5.0], [1.0, 1.0, 5.0], [0.0, 1.0, 5.0]].map(Point3::from)
         );
         assert_eq!(mesh.faces, [[0, 1, 2], [0, 2, 3]]);
-        assert_eq!(parse(&binary(true)).unwrap(), mesh);
-        assert_eq!(parse(&binary(false)).unwrap(), mesh);
+        assert_eq!(parse(&binary(true)).unwrap(), parsed);
+        assert_eq!(parse(&binary(false)).unwrap(), parsed);
     }
 
     #[test]
