@@ -445,10 +445,26 @@ fn help_shows_how() {
         &["demo", "--help"],
         &["render", "--help"],
         &["evaluate", "--help"],
+        &["convert", "--help"],
     ] {
         assert!(good(Path::new("."), args).contains("Examples:"), "{args:?}");
     }
     assert_eq!(good(Path::new("."), &["--version"]), concat!("host ", env!("CARGO_PKG_VERSION"), "\n"));
+}
+
+#[test]
+fn every_command_has_a_manual_page() {
+    let folder = TempDir::new().unwrap();
+    good(folder.path(), &["man", "pages"]);
+    let pages = folder.path().join("pages");
+    let main = fs::read_to_string(pages.join("host.1")).unwrap();
+    for name in ["replay", "capture", "listen", "demo", "convert", "man"] {
+        assert!(main.contains(&format!("host\\-{name}(1)")), "{name}");
+        assert!(
+            fs::read_to_string(pages.join(format!("host-{name}.1"))).unwrap().contains("Examples:"),
+            "{name}"
+        );
+    }
 }
 
 #[test]

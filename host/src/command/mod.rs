@@ -29,6 +29,7 @@ pub mod listen;
 mod batch;
 mod connect;
 pub mod convert;
+pub mod man;
 mod model;
 pub mod options;
 pub mod render;
@@ -101,6 +102,9 @@ enum Command {
     /// Completions for a shell
     #[command(long_about = page(include_str!("completions.rs")))]
     Completions(completions::Args),
+    /// Manual pages
+    #[command(long_about = page(include_str!("man.rs")))]
+    Man(man::Args),
 }
 
 impl Cli {
@@ -124,6 +128,7 @@ impl Cli {
             Command::Experiments(args) => told(args.json, experiments::run(args)),
             Command::Inspect(args) => told(args.json, inspect::run(args)),
             Command::Completions(args) => completions::run(args),
+            Command::Man(args) => man::run(args),
         }
     }
 }
