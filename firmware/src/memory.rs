@@ -7,7 +7,9 @@
 use heapless::Vec;
 use shared::arena;
 use shared::bitmap::{Size, Word};
-use shared::pipeline::{Branch, EyeMemory, Kernels, Memory, outline_words, scratch_words};
+#[cfg(not(target_os = "none"))]
+use shared::pipeline::Kernels;
+use shared::pipeline::{Branch, EyeMemory, Memory, outline_words, scratch_words};
 use shared::point::{Pixel, PixelPoint};
 use shared::stage::branch::Sample;
 use shared::stage::contour::{ContourLoop, ContourPoint};
@@ -17,6 +19,11 @@ use shared::stage::medial::MedialBall;
 use shared::stage::nearest::Pair;
 use shared::stage::nurbs::Control;
 use shared::stage::rows::ContourMatch;
+
+#[cfg(target_os = "none")]
+use crate::board::dsp::KERNELS;
+#[cfg(not(target_os = "none"))]
+const KERNELS: Kernels = Kernels::PORTABLE;
 
 /// Loops of a contour.
 const LOOPS: usize = 64;
@@ -113,7 +120,7 @@ macro_rules! storage {
                     boundary_pairs,
                     skeleton_pairs,
                     scratch: &mut self.scratch,
-kernels: Kernels::PORTABLE,
+                    kernels: KERNELS,
                 }
             }
         }
