@@ -186,8 +186,10 @@ impl<'a> Bitmap<'a> {
     /// Set what is clear and clear what is set, inside the image.
     pub fn invert(&mut self) {
         let n = self.size.row_words().max(1);
-        for i in 0..self.words.len() {
-            self.words[i] ^= self.valid(i % n);
+        let valid = self.valid(n - 1);
+        for row in self.words.chunks_exact_mut(n) {
+            row.iter_mut().for_each(|word| *word = !*word);
+            row[n - 1] &= valid;
         }
     }
 

@@ -85,8 +85,8 @@ fn largest_component_and_areas() {
     for image in images() {
         let (expected, largest, second) = naive::largest(&image);
         let count = naive::components(&image, true, true).len() as u32;
-        let mut scratch = vec![0x55; clean::scratch_words(naive::size(&image))];
-        let (kept, found) = on_bitmap(&image, |b| clean::keep_largest(b, &mut scratch).unwrap());
+        let mut block = vec![0x55; clean::scratch_words(naive::size(&image))];
+        let (kept, found) = on_bitmap(&image, |b| clean::keep_largest(b, Arena::new(&mut block)).unwrap());
         assert_eq!(kept, expected);
         assert_eq!(found, Components { count, largest: largest as u32, second: second as u32 });
     }
@@ -96,10 +96,13 @@ fn largest_component_and_areas() {
 fn holes_below_an_area_are_filled() {
     for image in images() {
         for below in [0, 2, clean::HOLE_AREA, u32::MAX] {
-            let mut scratch = vec![0x55; clean::scratch_words(naive::size(&image))];
-            let (filled, count) = on_bitmap(&image, |b| clean::fill_holes(b, below, &mut scratch).unwrap());
+            let mut block = vec![0x55; clean::scratch_words(naive::size(&image))];
+            let (filled, holes) =
+                on_bitmap(&image, |b| clean::fill_holes(b, below, Arena::new(&mut block)).unwrap());
             let expected = naive::fill_holes(&image, below as usize);
-            assert_eq!((filled, count as usize), expected);
+            let area = naive::set(&filled).len() - naive::set(&image).len();
+            assert_eq!((&filled, holes.count as usize), (&expected.0, expected.1));
+            assert_eq!(holes.area as usize, area);
         }
     }
 }
@@ -395,8 +398,9 @@ fn too_little_memory_is_an_error() {
     let mut data = vec![0; size.pixels()];
     let mut parabolas = vec![Parabola::default(); distance::scratch_parabolas(size.width)];
     on_bitmap(&image, |b| {
-        refused(clean::keep_largest(b, &mut vec![0; clean::scratch_words(size) - 1]).map(drop));
-        refused(clean::fill_holes(b, 60, &mut vec![0; clean::scratch_words(size) - 1]).map(drop));
+        let mut block = vec![0; clean::scratch_words(size) - 1];
+        refused(clean::keep_largest(b, Arena::new(&mut block)).map(drop));
+        refused(clean::fill_holes(b, 60, Arena::new(&mut block)).map(drop));
         refused(distance::distance(b, &mut data[1..], &mut parabolas).map(drop));
         refused(distance::distance(b, &mut data, &mut parabolas[1..]).map(drop));
         let mut row = vec![0; size.width - 1];
@@ -437,12 +441,12 @@ fn specks_cost_only_their_own_rows() {
         ("comb", picture(&|u, v| u % 2 == 0 || v == if u % 4 == 1 { 0 } else { side - 1 })),
         ("spiral", spiral(side)),
     ] {
-        let mut scratch = vec![0; clean::scratch_words(naive::size(&image))];
+        let mut block = vec![0; clean::scratch_words(naive::size(&image))];
         on_bitmap(&image, |b| {
             let start = std::time::Instant::now();
-            clean::fill_holes(b, 60, &mut scratch).unwrap();
+            clean::fill_holes(b, 60, Arena::new(&mut block)).unwrap();
             let holes = start.elapsed();
-            let found = clean::keep_largest(b, &mut scratch).unwrap();
+            let found = clean::keep_largest(b, Arena::new(&mut block)).unwrap();
             let all = start.elapsed();
             println!("{name}: {found:?}, holes {holes:?}, both {all:?}");
             assert!(all.as_secs() < 5, "{name} took {all:?}");

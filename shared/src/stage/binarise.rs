@@ -129,7 +129,8 @@ pub fn median_row_by_fours(
     let mut done = 1;
     if let Some(mut west) = columns.next() {
         // A word of medians lies one pixel east of a word of columns.
-        for (out, next) in out[1..].as_chunks_mut::<4>().0.iter_mut().zip(columns) {
+        for (out, next) in out.get_mut(1..).unwrap_or_default().as_chunks_mut::<4>().0.iter_mut().zip(columns)
+        {
             let centre = |west: u32, next: u32| west >> 8 | next << 24;
             let east = |west: u32, next: u32| west >> 16 | next << 16;
             let both = |place: fn(u32, u32) -> u32| {
@@ -212,20 +213,24 @@ pub fn count_row(histogram: &mut Histogram, row: &[u8]) {
 
 /// The histogram of an image.
 ///
-/// Pixels of one word count in tables of their own: neighbours tend to be equal, and a count that waits for
-/// the one before it is slow. No count of a raster comes near its limit.
+/// Neighbours count in tables of their own: they tend to be equal, and a count that waits for the one before
+/// it is slow. No count of a raster comes near its limit.
 pub fn histogram(grey: Grey<'_>) -> Histogram {
-    let mut tables = [[0u32; 256]; BYTES];
+    let mut tables = [[[0u32; 256]; 4]; BYTES / 4];
     for v in 0..grey.size().height {
         let (words, rest) = grey.row(v).as_chunks::<BYTES>();
         for word in words {
-            for (table, &value) in tables.iter_mut().zip(word) {
-                table[usize::from(value)] += 1;
+            for ([a, b, c, d], four) in tables.iter_mut().zip(word.as_chunks::<4>().0) {
+                let [p, q, r, s] = four.map(usize::from);
+                a[p] += 1;
+                b[q] += 1;
+                c[r] += 1;
+                d[s] += 1;
             }
         }
-        count_row(&mut tables[0], rest);
+        count_row(&mut tables[0][0], rest);
     }
-    core::array::from_fn(|value| tables.iter().map(|table| table[value]).sum())
+    core::array::from_fn(|value| tables.as_flattened().iter().map(|table| table[value]).sum())
 }
 
 /// Otsu's level: the first one that maximises the variance between the values up to it and those above
@@ -263,35 +268,36 @@ fn times(a: u128, b: u64) -> (u128, u64) {
 /// The bits of a row: set where a grey value lies on the object's side of the level. Fills as many
 /// words as the row has; `out` beyond them is left alone.
 pub fn binarise_row(row: &[u8], level: u8, tone: Tone, out: &mut [Word]) {
+    let dark = if tone == Tone::Dark { Word::MAX } else { 0 };
     let bright = above(level);
-    for (word, values) in out.iter_mut().zip(row.chunks(WORD_BITS)) {
-        let (groups, rest) = values.as_chunks::<BYTES>();
-        let mut bits = groups.iter().fold(0, |bits, &group| bits >> BYTES | bright(group));
-        if values.len() < WORD_BITS {
-            let mut group = [0; BYTES];
-            group[..rest.len()].copy_from_slice(rest);
-            bits = (bits >> BYTES | bright(group)) >> (WORD_BITS - (groups.len() + 1) * BYTES);
-        }
-        let valid = Word::MAX >> (WORD_BITS - values.len());
-        *word = if tone == Tone::Bright { bits } else { !bits & valid };
+    let bits = |values: &[u8; WORD_BITS]| {
+        let groups = values.as_chunks::<BYTES>().0;
+        groups.iter().fold(0, |bits, group| bits >> BYTES | bright(*group)) ^ dark
+    };
+    let (whole, rest) = row.as_chunks::<WORD_BITS>();
+    for (word, values) in out.iter_mut().zip(whole) {
+        *word = bits(values);
+    }
+    if let Some(word) = out.get_mut(whole.len()).filter(|_| !rest.is_empty()) {
+        let mut values = [0; WORD_BITS];
+        values[..rest.len()].copy_from_slice(rest);
+        *word = bits(&values) & Word::MAX >> (WORD_BITS - rest.len());
     }
 }
 
 /// Tells which of [`BYTES`] values lie above a level, in as many of a word's uppermost bits.
 ///
-/// The lower seven bits of each value are compared by an addition that carries into the eighth. The
-/// product then brings the eighth bits together: each of its terms falls on a bit of its own.
+/// A value lies above the level if its sum with what the level lacks of 255 does not fit a byte, so by the
+/// eighth bit of half that sum. The product then brings the eighth bits together: each of its terms falls on
+/// a bit of its own.
 fn above(level: u8) -> impl Fn([u8; BYTES]) -> Word + Copy {
     const ONES: Word = Word::MAX / 255;
-    const LOWER: Word = ONES * 0x7F;
     const GATHER: Word = Word::MAX / 127 >> BYTES;
-    let complement = Word::from(0x7F - level % 0x80) * ONES;
-    let low_level = if level < 0x80 { Word::MAX } else { 0 };
+    let lacking = Word::from(u8::MAX - level) * ONES;
     move |values| {
         let values = Word::from_le_bytes(values);
-        let carried = (values & LOWER) + complement;
-        let eighths = (values & carried | (values | carried) & low_level) & !LOWER;
-        eighths.wrapping_mul(GATHER) & !(Word::MAX >> BYTES)
+        let half_sum = (values & lacking) + ((values ^ lacking) >> 1 & ONES * 0x7F);
+        (half_sum & ONES * 0x80).wrapping_mul(GATHER) & !(Word::MAX >> BYTES)
     }
 }
 
@@ -302,7 +308,7 @@ pub fn binarise<'w>(
     tone: Tone,
     words: &'w mut [Word],
 ) -> Result<Bitmap<'w>, CapacityError> {
-    let mut bitmap = Bitmap::new(grey.size(), words)?;
+    let mut bitmap = Bitmap::over(grey.size(), words)?;
     for v in 0..grey.size().height {
         binarise_row(grey.row(v), level, tone, bitmap.row_mut(v as i32));
     }
