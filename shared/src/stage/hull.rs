@@ -48,8 +48,11 @@ pub fn convex_hull(
     extents: impl IntoIterator<Item = RowExtent>,
     out: &mut VecView<PixelPoint>,
 ) -> Result<(), CapacityError> {
-    let limit = out.capacity();
-    let overflow = CapacityError { what: "hull vertices", limit };
+    let overflow = CapacityError { what: "hull vertices", limit: out.capacity() };
+    let extents = extents.into_iter();
+    // A chain has a vertex a row at most.
+    let most = extents.size_hint().1.map_or(usize::MAX, |rows| rows.saturating_mul(2));
+    let limit = out.capacity().min(most);
     out.clear();
     out.resize_default(limit).map_err(|_| overflow)?;
     let points = out.as_mut_slice();
