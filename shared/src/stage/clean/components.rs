@@ -5,7 +5,7 @@
 //! | in | a [`Bitmap`] |
 //! | out | each component once, when the row after its last one has been read: its area and first pixel |
 //! | scratch | two rows of runs; no labels |
-//! | cost | linear in the words and the runs, but for the depth of the trees of a union-find within a row |
+//! | cost | linear in the words and the runs of the rows from the first set pixel to the last, but for the depth of the trees of a union-find within a row |
 //!
 //! What a component has gathered goes down with the first of its runs in each row, its leader. Runs of a row
 //! start as components of their own; one that touches a run above takes over what that one's leader has, and
@@ -24,7 +24,8 @@ pub(super) struct Component {
     pub(super) area: u32,
     /// Its first pixel in raster order.
     pub(super) first: Pixel,
-    /// Whether it has a pixel on the border of the image.
+    /// Whether it has a pixel on the border of the image, or in the first or last row that has set pixels: clear
+    /// ones are then no hole.
     pub(super) on_border: bool,
 }
 
@@ -68,9 +69,14 @@ pub(super) fn each_component(
     [mut above, mut here]: [&mut [Run]; 2],
     mut complete: impl FnMut(&mut Bitmap<'_>, Component),
 ) {
+    let n = bitmap.size().row_words().max(1);
+    let first = bitmap.words().iter().position(|word| *word != 0);
+    let last = bitmap.words().iter().rposition(|word| *word != 0);
+    let (Some(top), Some(bottom)) = (first.map(|i| i / n), last.map(|i| i / n)) else { return };
     let mut count_above = 0;
-    for v in 0..=bitmap.size().height {
-        let count = find_runs(bitmap, v, ground, here);
+    for v in top..=bottom + 1 {
+        let whole = v == top || v == bottom;
+        let count = if v <= bottom { find_runs(bitmap, (v, whole), ground, here) } else { 0 };
         join(&mut above[..count_above], &mut here[..count], ground);
         for (k, run) in above[..count_above].iter().enumerate() {
             if usize::from(run.parent) == k && run.heir == NOBODY {
@@ -82,10 +88,9 @@ pub(super) fn each_component(
     }
 }
 
-/// The runs of a row, each a component of its own; returns how many there are.
-fn find_runs(bitmap: &Bitmap<'_>, v: usize, ground: Ground, runs: &mut [Run]) -> usize {
-    let size = bitmap.size();
-    let whole = v == 0 || v + 1 == size.height;
+/// The runs of row `v`, each a component of its own, on the border if that is `whole`; returns how many.
+fn find_runs(bitmap: &Bitmap<'_>, (v, whole): (usize, bool), ground: Ground, runs: &mut [Run]) -> usize {
+    let width = bitmap.size().width;
     let (mut count, mut start) = (0, 0);
     let mut add = |start: usize, end: usize| {
         runs[count] = Run {
@@ -95,7 +100,7 @@ fn find_runs(bitmap: &Bitmap<'_>, v: usize, ground: Ground, runs: &mut [Run]) ->
             heir: NOBODY,
             area: (end - start) as u32,
             first: Pixel { u: start as u16, v: v as u16 },
-            on_border: u32::from(whole || start == 0 || end == size.width),
+            on_border: u32::from(whole || start == 0 || end == width),
         };
         count += 1;
     };
@@ -115,8 +120,8 @@ fn find_runs(bitmap: &Bitmap<'_>, v: usize, ground: Ground, runs: &mut [Run]) ->
             other = !other & Word::MAX << bit;
         }
     }
-    if within != 0 && start < size.width {
-        add(start, size.width);
+    if within != 0 && start < width {
+        add(start, width);
     }
     count
 }
