@@ -7,9 +7,7 @@
 use heapless::Vec;
 use shared::arena;
 use shared::bitmap::{Size, Word};
-#[cfg(not(target_os = "none"))]
-use shared::pipeline::Kernels;
-use shared::pipeline::{Branch, EyeMemory, Memory, outline_words, scratch_words};
+use shared::pipeline::{Branch, EyeMemory, Kernels, Memory, outline_words, scratch_words};
 use shared::point::{Pixel, PixelPoint};
 use shared::stage::branch::Sample;
 use shared::stage::contour::{ContourLoop, ContourPoint};
@@ -20,8 +18,10 @@ use shared::stage::nearest::Pair;
 use shared::stage::nurbs::Control;
 use shared::stage::rows::ContourMatch;
 
+/// How this machine runs the core's inner loops.
 #[cfg(target_os = "none")]
-use crate::board::dsp::KERNELS;
+const KERNELS: Kernels = crate::board::dsp::KERNELS;
+/// How this machine runs the core's inner loops.
 #[cfg(not(target_os = "none"))]
 const KERNELS: Kernels = Kernels::PORTABLE;
 

@@ -1,22 +1,30 @@
-//! Kernels by the DSP instructions of the Cortex-M4 and M7, which take four bytes of a word at once.
-#![expect(unsafe_code, reason = "instructions that the language has no name for")]
+//! The core's inner loops by the DSP instructions that Cortex-M4 and M7 share: four bytes of a word at once.
+#![expect(unsafe_code, reason = "an instruction that the language has no name for")]
 
 use core::arch::asm;
 use shared::pipeline::Kernels;
 use shared::stage::binarise::median_row_by_fours;
 
-/// What the core's inner loops are on a board.
-pub const KERNELS: Kernels = Kernels {
-    median_row: |above, here, below, out| median_row_by_fours([above, here, below], out, uqsub8),
+/// What every board lends beside its memory.
+pub const KERNELS: Kernels = {
+    let mut kernels = Kernels::PORTABLE;
+    kernels.median_row = |above, here, below, out| median_row_by_fours([above, here, below], out, uqsub8);
+    kernels
 };
 
-/// Byte by byte, how much `a` exceeds `b`, or 0.
+/// How much each byte of `a` exceeds that of `b`, or 0.
 #[inline(always)]
 fn uqsub8(a: u32, b: u32) -> u32 {
     let excess;
-    // SAFETY: changes nothing but the result, not even flags.
+    // SAFETY: it computes one register from two, and changes nothing else, flags included.
     unsafe {
-        asm!("uqsub8 {}, {}, {}", out(reg) excess, in(reg) a, in(reg) b, options(pure, nomem, nostack, preserves_flags));
+        asm!(
+            "uqsub8 {}, {}, {}",
+            out(reg) excess,
+            in(reg) a,
+            in(reg) b,
+            options(pure, nomem, nostack, preserves_flags)
+        );
     }
     excess
 }
