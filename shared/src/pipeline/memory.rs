@@ -5,6 +5,7 @@ use crate::arena;
 use crate::bitmap::{Size, Word};
 use crate::point::PixelPoint;
 use crate::stage::branch::Sample;
+use crate::stage::clean;
 use crate::stage::contour::{ContourLoop, ContourPoint, EdgeCrossing};
 use crate::stage::depth::BallDepth;
 use crate::stage::distance::{Parabola, scratch_parabolas};
@@ -99,7 +100,7 @@ pub const fn outline_words(size: Size, points: usize) -> usize {
     let bitmap = arena::words::<Word>(size.words());
     // A loop has up to sqrt 2 cracks a point, the staircase of a diagonal.
     let cracks = arena::words::<EdgeCrossing>(points * 3 / 2);
-    arena::words::<u8>(size.pixels()) + max(2 * bitmap, bitmap + cracks)
+    arena::words::<u8>(size.pixels()) + max(clean::scratch_words(size), bitmap + cracks)
 }
 
 const fn max(a: usize, b: usize) -> usize {
