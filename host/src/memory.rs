@@ -2,7 +2,7 @@
 
 use shared::bitmap::{Size, Word};
 use shared::limits::CapacityError;
-use shared::pipeline::{Branch, EyeMemory, Kernels, Memory, scratch_words};
+use shared::pipeline::{Branch, EyeMemory, Memory, scratch_words};
 use shared::point::PixelPoint;
 use shared::stage::branch::Sample;
 use shared::stage::contour::{ContourLoop, ContourPoint};
@@ -111,7 +111,7 @@ impl Storage {
             boundary_pairs: &mut *self.boundary_pairs,
             skeleton_pairs: &mut *self.skeleton_pairs,
             scratch: &mut self.scratch,
-            kernels: Kernels::PORTABLE,
+            kernels: crate::wide::kernels(),
         }
     }
 }

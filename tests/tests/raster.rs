@@ -12,6 +12,7 @@ use shared::stage::boundary::{self, Element};
 use shared::stage::clean::{self, Components};
 use shared::stage::distance::{self, Parabola};
 use shared::stage::hull::{self, RowExtent};
+use shared::stage::parallel_thinning;
 use shared::stage::thinning::{self, Report, Rule};
 
 const RULES: [Rule; 4] = [Rule::HitOrMiss, Rule::ZhangSuen, Rule::GuoHall, Rule::EdtOrdered];
@@ -76,7 +77,7 @@ fn thin(image: &Image, rule: Rule) -> (Image, Report) {
             Rule::EdtOrdered => vec![7; words::<u32>(thinning::scratch_order(bitmap.count(), largest))],
             _ => vec![7; words::<Word>(thinning::scratch_words(size))],
         };
-        thinning::thin(bitmap, rule, &plane, Arena::new(&mut block)).unwrap()
+        thinning::thin(bitmap, (rule, parallel_thinning::thin), &plane, Arena::new(&mut block)).unwrap()
     })
 }
 
@@ -406,14 +407,17 @@ fn too_little_memory_is_an_error() {
         let mut block = vec![0; words::<Word>(thinning::scratch_words(size)) - 1];
         let plane = distance::distance(b, &mut data, &mut parabolas).unwrap();
         for rule in RULES {
-            refused(thinning::thin(b, rule, &plane, Arena::new(&mut block)).map(drop));
+            refused(
+                thinning::thin(b, (rule, parallel_thinning::thin), &plane, Arena::new(&mut block)).map(drop),
+            );
         }
     });
     on_bitmap(&image, |b| {
         // Distances of another size read as 0 outside: a worse order, no panic.
         let plane = Plane::over(Size::new(7, 3).unwrap(), &mut data).unwrap();
         let mut block = vec![0; words::<u32>(thinning::scratch_order(b.count(), u16::MAX))];
-        thinning::thin(b, Rule::EdtOrdered, &plane, Arena::new(&mut block)).unwrap();
+        thinning::thin(b, (Rule::EdtOrdered, parallel_thinning::thin), &plane, Arena::new(&mut block))
+            .unwrap();
     });
     let grey = Grey::new(size, size.width, &[0; 4800]).unwrap();
     refused(binarise::median(grey, &mut [0; 4799], binarise::median_row).map(drop));

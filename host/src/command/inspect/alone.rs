@@ -4,6 +4,7 @@
 
 use super::{Args, Made, Stage};
 use crate::report::record::{DistanceImage, mask_image};
+use crate::wide;
 use image::GrayImage;
 use shared::arena::{Arena, words};
 use shared::bitmap::{Bitmap, Grey, Plane, Size, Word};
@@ -64,7 +65,8 @@ impl Memory {
                     Rule::EdtOrdered => distance(&bitmap, &mut self.plane, &mut self.parabolas)?,
                     _ => Plane::over(self.size, &mut self.plane)?,
                 };
-                self.thinned = thin(&mut bitmap, rule, &plane, Arena::new(&mut self.scratch))?;
+                self.thinned =
+                    thin(&mut bitmap, (rule, wide::kernels().thin), &plane, Arena::new(&mut self.scratch))?;
                 unpack(&bitmap, &mut self.bytes);
             }
             Stage::Distance => {
