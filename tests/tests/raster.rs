@@ -12,7 +12,7 @@ use shared::stage::boundary::{self, Element};
 use shared::stage::clean::{self, Components};
 use shared::stage::distance::{self, Parabola};
 use shared::stage::hull::{self, RowExtent};
-use shared::stage::parallel_thinning;
+use shared::stage::parallel_thinning::{self, Parallel};
 use shared::stage::thinning::{self, Report, Rule};
 
 const RULES: [Rule; 4] = [Rule::HitOrMiss, Rule::ZhangSuen, Rule::GuoHall, Rule::EdtOrdered];
@@ -184,6 +184,35 @@ fn thinning_equals_its_twin() {
             assert_eq!(skeleton, twin(rule, &image), "{rule:?}");
             let deleted = naive::set(&image).len() - naive::set(&skeleton).len();
             assert_eq!(report.deleted as usize, deleted);
+        }
+    }
+}
+
+#[test]
+fn every_width_of_register_thins_alike() {
+    let widths = host::wide::widths();
+    for (name, thin) in widths {
+        if thin.is_none() {
+            eprintln!("\n!!!! SKIPPED: this machine has no {name}, so NOTHING is thinned in it !!!!\n");
+        }
+    }
+    let mut images: Vec<Image> = (1..=200usize)
+        .flat_map(|width| {
+            let (height, seed) = (1 + (7 * width) % 61, width as u64);
+            [naive::noise(width, height, 50 + seed % 45, seed), naive::blobs(width, 70 - height, seed)]
+        })
+        .collect();
+    // Blocks of more than one group of rows, and a last one that is not whole.
+    images.push(naive::noise(90, 2531, 95, 2));
+    for image in images {
+        for rule in [Parallel::HitOrMiss, Parallel::ZhangSuen, Parallel::GuoHall] {
+            let mut scratch = vec![7; thinning::scratch_words(naive::size(&image))];
+            let expected = on_bitmap(&image, |b| parallel_thinning::thin(b, rule, &mut scratch).unwrap());
+            for (name, thin) in widths.iter().filter_map(|(name, thin)| Some((name, (*thin)?))) {
+                scratch.fill(Word::MAX);
+                let found = on_bitmap(&image, |b| thin(b, rule, &mut scratch).unwrap());
+                assert!(found == expected, "{name}, {rule:?}, {:?}", naive::size(&image));
+            }
         }
     }
 }
@@ -404,9 +433,13 @@ fn too_little_memory_is_an_error() {
         refused(distance::squared_distances(b, &mut data, &mut parabolas, &mut row, |_, _| ()));
         refused(boundary::boundary(b, Element::Square, &mut [0; 3]).map(drop));
         refused(hull::convex_hull(hull::bitmap_extents(b), &mut List::<_, 5>::new()));
-        let mut block = vec![0; words::<Word>(thinning::scratch_words(size)) - 1];
         let plane = distance::distance(b, &mut data, &mut parabolas).unwrap();
         for rule in RULES {
+            let enough = match rule {
+                Rule::EdtOrdered => words::<u32>(thinning::scratch_order(b.count(), 16)),
+                _ => words::<Word>(thinning::scratch_words(size)),
+            };
+            let mut block = vec![0; enough - 1];
             refused(
                 thinning::thin(b, (rule, parallel_thinning::thin), &plane, Arena::new(&mut block)).map(drop),
             );

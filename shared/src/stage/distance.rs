@@ -124,14 +124,16 @@ fn rows(bitmap: &Bitmap<'_>) -> Range<usize> {
 }
 
 /// The runs of set pixels of a row, from left to right.
-struct Runs<'a> {
+#[derive(Clone, Debug)]
+pub struct Runs<'a> {
     row: &'a [Word],
     /// Where to look on.
     from: usize,
 }
 
 impl<'a> Runs<'a> {
-    const fn of(row: &'a [Word]) -> Self {
+    /// Those of a row of a bitmap.
+    pub const fn of(row: &'a [Word]) -> Self {
         Self { row, from: 0 }
     }
 

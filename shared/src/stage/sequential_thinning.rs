@@ -13,7 +13,7 @@
 use crate::arena::Arena;
 use crate::bitmap::{Bitmap, Plane, SetBits, WORD_BITS};
 use crate::limits::{CapacityError, MAX_SIDE};
-use crate::stage::distance::DISTANCE_PX;
+use crate::stage::distance::{DISTANCE_PX, Runs};
 use crate::stage::parallel_thinning::Report;
 
 /// Whether a pixel with these neighbours is simple: deleting it changes neither the 8-connected
@@ -38,7 +38,8 @@ pub const SIMPLE: [bool; 256] = {
     table
 };
 
-/// Entries of scratch that [`thin`] needs: one per set pixel, one per value of the distance.
+/// Entries of scratch that [`thin`] needs: one per set pixel, one per value of the distance up to the largest
+/// of its plane.
 pub const fn scratch_order(set_pixels: usize, largest_distance: u16) -> usize {
     set_pixels + largest_distance as usize + 1
 }
@@ -110,8 +111,8 @@ fn sort_by_distance<'o>(
     distance: &Plane<'_, u16>,
     mut scratch: Arena<'o>,
 ) -> Result<&'o mut [u32], CapacityError> {
-    let mut largest = 0;
-    each_pixel(bitmap, distance, |_, _, d| largest = largest.max(d));
+    let rows = (0..bitmap.size().height).map(|v| distance.row(v));
+    let largest = rows.filter_map(|row| row.iter().max()).max().copied().unwrap_or(0);
     let set = bitmap.count();
     let order = scratch.take::<u32>(scratch_order(set, largest), "entries of the thinning order")?;
     let (list, next) = order.split_at_mut(set);
@@ -134,8 +135,8 @@ fn sort_by_distance<'o>(
 fn each_pixel(bitmap: &Bitmap<'_>, distance: &Plane<'_, u16>, mut take: impl FnMut(usize, usize, u16)) {
     for v in 0..bitmap.size().height {
         let row = distance.row(v);
-        for (i, &word) in bitmap.row(v as i32).iter().enumerate() {
-            for u in SetBits(word).map(|bit| i * WORD_BITS + bit) {
+        for run in Runs::of(bitmap.row(v as i32)) {
+            for u in run {
                 take(u, v, row.get(u).copied().unwrap_or(0));
             }
         }
