@@ -12,7 +12,7 @@ use shared::stage::medial::MedialBall;
 use shared::stage::nearest::Pair;
 use shared::stage::nurbs::{Control, MAX_CONTROLS};
 use shared::stage::rows::ContourMatch;
-use shared::stage::thinning::scratch_order;
+use shared::stage::sequential_thinning::scratch_order;
 
 /// Contour points, path pixels and crossings: a silhouette of 3840x2160 has about 12,000.
 const POINTS: usize = 1 << 15;

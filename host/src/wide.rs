@@ -36,6 +36,7 @@ pub fn widths() -> [(&'static str, Option<Thin>); 0] {
 mod x86 {
     use core::arch::x86_64::*;
     use core::ops::{BitAnd, BitOr, BitXor, Not, Shl, Shr};
+    use shared::arena::Arena;
     use shared::bitmap::{Bitmap, Word};
     use shared::lanes::Lanes;
     use shared::limits::CapacityError;
@@ -141,13 +142,13 @@ mod x86 {
             pub(super) fn $thin(
                 bitmap: &mut Bitmap<'_>,
                 rule: Parallel,
-                scratch: &mut [Word],
+                scratch: Arena<'_>,
             ) -> Result<Report, CapacityError> {
                 #[target_feature(enable = $features)]
                 fn compiled(
                     bitmap: &mut Bitmap<'_>,
                     rule: Parallel,
-                    scratch: &mut [Word],
+                    scratch: Arena<'_>,
                 ) -> Result<Report, CapacityError> {
                     thin_in_lanes::<$name>(bitmap, rule, scratch)
                 }

@@ -12,8 +12,9 @@ use shared::stage::boundary::{self, Element};
 use shared::stage::clean::{self, Components};
 use shared::stage::distance::{self, Parabola};
 use shared::stage::hull::{self, RowExtent};
-use shared::stage::parallel_thinning::{self, Parallel};
-use shared::stage::thinning::{self, Report, Rule};
+use shared::stage::parallel_thinning::{self, Parallel, Report};
+use shared::stage::sequential_thinning;
+use shared::stage::thinning::{self, Rule};
 
 const RULES: [Rule; 4] = [Rule::HitOrMiss, Rule::ZhangSuen, Rule::GuoHall, Rule::EdtOrdered];
 
@@ -74,8 +75,10 @@ fn thin(image: &Image, rule: Rule) -> (Image, Report) {
         let plane = distance::distance(bitmap, &mut data, &mut parabolas).unwrap();
         let largest = (0..size.height).flat_map(|v| plane.row(v)).copied().max().unwrap_or(0);
         let mut block = match rule {
-            Rule::EdtOrdered => vec![7; words::<u32>(thinning::scratch_order(bitmap.count(), largest))],
-            _ => vec![7; words::<Word>(thinning::scratch_words(size))],
+            Rule::EdtOrdered => {
+                vec![7; words::<u32>(sequential_thinning::scratch_order(bitmap.count(), largest))]
+            }
+            _ => vec![7; words::<Word>(parallel_thinning::scratch_words(size))],
         };
         thinning::thin(bitmap, (rule, parallel_thinning::thin), &plane, Arena::new(&mut block)).unwrap()
     })
@@ -206,11 +209,12 @@ fn every_width_of_register_thins_alike() {
     images.push(naive::noise(90, 2531, 95, 2));
     for image in images {
         for rule in [Parallel::HitOrMiss, Parallel::ZhangSuen, Parallel::GuoHall] {
-            let mut scratch = vec![7; thinning::scratch_words(naive::size(&image))];
-            let expected = on_bitmap(&image, |b| parallel_thinning::thin(b, rule, &mut scratch).unwrap());
+            let mut block = vec![7; words::<Word>(parallel_thinning::scratch_words(naive::size(&image)))];
+            let expected =
+                on_bitmap(&image, |b| parallel_thinning::thin(b, rule, Arena::new(&mut block)).unwrap());
             for (name, thin) in widths.iter().filter_map(|(name, thin)| Some((name, (*thin)?))) {
-                scratch.fill(Word::MAX);
-                let found = on_bitmap(&image, |b| thin(b, rule, &mut scratch).unwrap());
+                block.fill(u64::MAX);
+                let found = on_bitmap(&image, |b| thin(b, rule, Arena::new(&mut block)).unwrap());
                 assert!(found == expected, "{name}, {rule:?}, {:?}", naive::size(&image));
             }
         }
@@ -232,7 +236,7 @@ fn thinning_of_all_neighbourhoods() {
 fn simple_pixels_by_table_and_by_counting() {
     for code in 0..256usize {
         let around = std::array::from_fn(|k| (code >> k & 1) as u8);
-        assert_eq!(thinning::SIMPLE[code], naive::is_simple(around), "{code:08b}");
+        assert_eq!(sequential_thinning::SIMPLE[code], naive::is_simple(around), "{code:08b}");
     }
 }
 
@@ -261,7 +265,7 @@ fn minimal_skeletons_keep_their_topology() {
     for image in images() {
         for rule in RULES {
             let (skeleton, _) = thin(&image, rule);
-            let (thinned, deleted) = on_bitmap(&skeleton, thinning::minimal);
+            let (thinned, deleted) = on_bitmap(&skeleton, sequential_thinning::minimal);
             assert_eq!(thinned, naive::minimal(&skeleton));
             assert_eq!(naive::set(&skeleton).len() - naive::set(&thinned).len(), deleted as usize);
             assert_eq!(naive::topology(&thinned), naive::topology(&skeleton));
@@ -436,8 +440,8 @@ fn too_little_memory_is_an_error() {
         let plane = distance::distance(b, &mut data, &mut parabolas).unwrap();
         for rule in RULES {
             let enough = match rule {
-                Rule::EdtOrdered => words::<u32>(thinning::scratch_order(b.count(), 16)),
-                _ => words::<Word>(thinning::scratch_words(size)),
+                Rule::EdtOrdered => words::<u32>(sequential_thinning::scratch_order(b.count(), 16)),
+                _ => words::<Word>(parallel_thinning::scratch_words(size)),
             };
             let mut block = vec![0; enough - 1];
             refused(
@@ -448,7 +452,7 @@ fn too_little_memory_is_an_error() {
     on_bitmap(&image, |b| {
         // Distances of another size read as 0 outside: a worse order, no panic.
         let plane = Plane::over(Size::new(7, 3).unwrap(), &mut data).unwrap();
-        let mut block = vec![0; words::<u32>(thinning::scratch_order(b.count(), u16::MAX))];
+        let mut block = vec![0; words::<u32>(sequential_thinning::scratch_order(b.count(), u16::MAX))];
         thinning::thin(b, (Rule::EdtOrdered, parallel_thinning::thin), &plane, Arena::new(&mut block))
             .unwrap();
     });

@@ -29,6 +29,7 @@
 //! | scratch | [`scratch_words`] words |
 //! | cost | words of the outline x layers: some 40 operations a look for eight rows of a register's width |
 
+use crate::arena::Arena;
 use crate::bitmap::{Bitmap, SetBits, Size, WORD_BITS, Word, at};
 use crate::lanes::Lanes;
 use crate::limits::CapacityError;
@@ -55,13 +56,13 @@ pub struct Report {
 }
 
 /// Thins by a rule with [`scratch_words`] words of scratch: [`thin`], or the same in wider registers.
-pub type Thin = fn(&mut Bitmap<'_>, Parallel, &mut [Word]) -> Result<Report, CapacityError>;
+pub type Thin = fn(&mut Bitmap<'_>, Parallel, Arena<'_>) -> Result<Report, CapacityError>;
 
 /// Thin by a rule.
 ///
 /// # Errors
 /// A [`CapacityError`] when there is less scratch than [`scratch_words`].
-pub fn thin(bitmap: &mut Bitmap<'_>, rule: Parallel, scratch: &mut [Word]) -> Result<Report, CapacityError> {
+pub fn thin(bitmap: &mut Bitmap<'_>, rule: Parallel, scratch: Arena<'_>) -> Result<Report, CapacityError> {
     thin_in_lanes::<Word>(bitmap, rule, scratch)
 }
 
@@ -73,12 +74,9 @@ pub fn thin(bitmap: &mut Bitmap<'_>, rule: Parallel, scratch: &mut [Word]) -> Re
 pub fn thin_in_lanes<L: Lanes>(
     bitmap: &mut Bitmap<'_>,
     rule: Parallel,
-    scratch: &mut [Word],
+    mut scratch: Arena<'_>,
 ) -> Result<Report, CapacityError> {
-    let limit = scratch.len();
-    let scratch = scratch
-        .get_mut(..scratch_words(bitmap.size()))
-        .ok_or(CapacityError { what: "words of scratch", limit })?;
+    let scratch = scratch.take(scratch_words(bitmap.size()), "words of scratch")?;
     let Some(cut) = Cut::of(bitmap) else { return Ok(Report::default()) };
     let (mut now, rest) = scratch[..cut.words()].split_at_mut(cut.count * cut.stride());
     let (mut next, marks) = rest.split_at_mut(cut.count * cut.stride());

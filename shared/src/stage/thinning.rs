@@ -12,7 +12,7 @@
 //! | | |
 //! |---|---|
 //! | in, out | a [`Bitmap`], changed in place; outside is clear |
-//! | scratch | the parallel rules: [`scratch_words`]; EDT-ordered: [`scratch_order`] entries and the distances |
+//! | scratch | the parallel rules: [`scratch_words`](super::parallel_thinning::scratch_words); EDT-ordered: [`scratch_order`](sequential_thinning::scratch_order) entries and the distances |
 //! | cost | that of [`parallel_thinning`](super::parallel_thinning) and [`sequential_thinning`] |
 //!
 //! All but Zhang-Suen keep the number of components and of holes, so that no component is emptied: an
@@ -24,11 +24,8 @@
 use crate::arena::Arena;
 use crate::bitmap::{Bitmap, Plane};
 use crate::limits::CapacityError;
-use crate::stage::parallel_thinning::{Parallel, Thin};
+use crate::stage::parallel_thinning::{Parallel, Report, Thin};
 use crate::stage::sequential_thinning;
-
-pub use crate::stage::parallel_thinning::{Report, scratch_words};
-pub use crate::stage::sequential_thinning::{SIMPLE, minimal, scratch_order};
 
 /// Which pixels are deleted, and in which order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -45,7 +42,7 @@ pub enum Rule {
 }
 
 /// Thin by a rule, a parallel one with `parallel`; `distance` serves [`Rule::EdtOrdered`] alone. The scratch
-/// holds [`scratch_order`] entries for that rule, [`scratch_words`] words for the others.
+/// holds [`scratch_order`](sequential_thinning::scratch_order) entries for that rule, [`scratch_words`](super::parallel_thinning::scratch_words) words for the others.
 ///
 /// # Errors
 /// A [`CapacityError`] when there is less scratch.
@@ -53,7 +50,7 @@ pub fn thin(
     bitmap: &mut Bitmap<'_>,
     (rule, parallel): (Rule, Thin),
     distance: &Plane<'_, u16>,
-    mut scratch: Arena<'_>,
+    scratch: Arena<'_>,
 ) -> Result<Report, CapacityError> {
     let rule = match rule {
         Rule::HitOrMiss => Parallel::HitOrMiss,
@@ -61,6 +58,5 @@ pub fn thin(
         Rule::GuoHall => Parallel::GuoHall,
         Rule::EdtOrdered => return sequential_thinning::thin(bitmap, distance, scratch),
     };
-    let words = scratch.take(scratch_words(bitmap.size()), "words of scratch")?;
-    parallel(bitmap, rule, words)
+    parallel(bitmap, rule, scratch)
 }
