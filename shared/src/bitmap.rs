@@ -239,18 +239,23 @@ impl<'a> Bitmap<'a> {
     }
 
     /// The eight neighbours of a pixel as a byte, bit 0 north, then clockwise: N NE E SE S SW W NW.
+    #[inline]
     pub fn neighbours(&self, u: i32, v: i32) -> u8 {
         let (bit, place) = (u as usize % WORD_BITS, u as usize / WORD_BITS);
         if bit == 0 || bit == WORD_BITS - 1 || !self.size.contains(u, v) {
-            // Some neighbours lie in another word.
-            const AROUND: [(i32, i32); 8] =
-                [(0, -1), (1, -1), (1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1)];
-            let bits = AROUND.map(|(du, dv)| u8::from(self.get(u + du, v + dv)));
-            return bits.into_iter().rev().fold(0, |n, bit| n << 1 | bit);
+            return self.neighbours_apart(u, v);
         }
         let (n, i) = (self.size.row_words(), v as usize * self.size.row_words() + place);
         let three = |i: usize| at(self.words, i) >> (bit - 1) & 0b111;
         AROUND_OF_SQUARE[(three(i.wrapping_sub(n)) | three(i) << 3 | three(i + n) << 6) as usize]
+    }
+
+    /// [`Self::neighbours`], some of which lie in another word or outside.
+    #[cold]
+    fn neighbours_apart(&self, u: i32, v: i32) -> u8 {
+        const AROUND: [(i32, i32); 8] =
+            [(0, -1), (1, -1), (1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1)];
+        AROUND.iter().enumerate().fold(0, |n, (k, (du, dv))| n | u8::from(self.get(u + du, v + dv)) << k)
     }
 
     /// The eight neighbours of all pixels of word `i` of row `v`, in the order of [`Self::neighbours`].

@@ -8,6 +8,8 @@ use crate::limits::CapacityError;
 
 /// One in each byte.
 const ONES: u64 = u64::MAX / 255;
+/// All bits of each byte but the highest.
+const LOW: u64 = !(ONES << 7);
 /// Byte `k` has bit `k`.
 const DIAGONAL: u64 = 0x8040_2010_0804_0201;
 
@@ -56,13 +58,13 @@ pub fn unpack(bitmap: &Bitmap<'_>, bytes: &mut [u8]) -> Result<(), CapacityError
 fn packed(bytes: [u8; 8]) -> u8 {
     let bytes = u64::from_le_bytes(bytes);
     // The high bit of each byte that is not 0, moved to its lowest; the product gathers them in the top byte.
-    let set = ((bytes & !(ONES << 7)) + (ONES * 0x7f) | bytes) >> 7 & ONES;
+    let set = (((bytes & LOW) + LOW) | bytes) >> 7 & ONES;
     (set.wrapping_mul(0x0102_0408_1020_4080) >> 56) as u8
 }
 
 /// 255 for each bit that is set.
 fn unpacked(bits: u8) -> [u8; 8] {
-    let set = ((u64::from(bits) * ONES & DIAGONAL) + ONES * 0x7f) >> 7 & ONES;
+    let set = (((u64::from(bits) * ONES) & DIAGONAL) + LOW) >> 7 & ONES;
     (set * 255).to_le_bytes()
 }
 

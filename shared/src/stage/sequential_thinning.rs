@@ -15,6 +15,7 @@ use crate::bitmap::{Bitmap, Plane, SetBits, WORD_BITS};
 use crate::limits::{CapacityError, MAX_SIDE};
 use crate::stage::distance::{DISTANCE_PX, Runs};
 use crate::stage::parallel_thinning::Report;
+use core::ops::Range;
 
 /// Whether a pixel with these neighbours is simple: deleting it changes neither the 8-connected
 /// components of the object nor the 4-connected ones of the background. That is so when its crossing
@@ -38,8 +39,7 @@ pub const SIMPLE: [bool; 256] = {
     table
 };
 
-/// Entries of scratch that [`thin`] needs: one per set pixel, one per value of the distance up to the largest
-/// of its plane.
+/// Entries of scratch that [`thin`] needs: one per set pixel, one per value of their distance.
 pub const fn scratch_order(set_pixels: usize, largest_distance: u16) -> usize {
     set_pixels + largest_distance as usize + 1
 }
@@ -111,50 +111,53 @@ fn sort_by_distance<'o>(
     distance: &Plane<'_, u16>,
     mut scratch: Arena<'o>,
 ) -> Result<&'o mut [u32], CapacityError> {
-    let rows = (0..bitmap.size().height).map(|v| distance.row(v));
-    let largest = rows.filter_map(|row| row.iter().max()).max().copied().unwrap_or(0);
+    let values = |(v, run): (usize, Range<usize>)| {
+        let row = distance.row(v);
+        run.map(|u| value(row, u)).fold(0, u16::max)
+    };
+    let largest = object_runs(bitmap).map(values).max().unwrap_or(0);
     let set = bitmap.count();
     let order = scratch.take::<u32>(scratch_order(set, largest), "entries of the thinning order")?;
     let (list, next) = order.split_at_mut(set);
     next.fill(0);
-    each_pixel(bitmap, distance, |_, _, d| next[usize::from(d)] += 1);
+    for (v, run) in object_runs(bitmap) {
+        let row = distance.row(v);
+        run.for_each(|u| next[usize::from(value(row, u))] += 1);
+    }
     let mut start = 0;
     for entry in next.iter_mut() {
         start += core::mem::replace(entry, start);
     }
-    each_pixel(bitmap, distance, |u, v, d| {
-        let place = &mut next[usize::from(d)];
-        let mark = if d > ANCHOR_DISTANCE && is_anchor(distance, u, v) { ANCHOR } else { 0 };
-        list[*place as usize] = mark | (v as u32) << COLUMN_BITS | u as u32;
-        *place += 1;
-    });
+    for (v, run) in object_runs(bitmap) {
+        let rows = [v.wrapping_sub(1), v, v + 1].map(|v| distance.row(v));
+        for u in run {
+            let d = value(rows[1], u);
+            let place = &mut next[usize::from(d)];
+            let mark = if d > ANCHOR_DISTANCE && is_anchor(rows, u) { ANCHOR } else { 0 };
+            list[*place as usize] = mark | (v as u32) << COLUMN_BITS | u as u32;
+            *place += 1;
+        }
+    }
     Ok(list)
 }
 
-/// The set pixels in raster order: column, row and distance.
-fn each_pixel(bitmap: &Bitmap<'_>, distance: &Plane<'_, u16>, mut take: impl FnMut(usize, usize, u16)) {
-    for v in 0..bitmap.size().height {
-        let row = distance.row(v);
-        for run in Runs::of(bitmap.row(v as i32)) {
-            for u in run {
-                take(u, v, row.get(u).copied().unwrap_or(0));
-            }
-        }
-    }
+/// The runs of set pixels in raster order, each with its row.
+fn object_runs<'b>(bitmap: &'b Bitmap<'_>) -> impl Iterator<Item = (usize, Range<usize>)> + 'b {
+    let rows = 0..bitmap.size().height;
+    rows.flat_map(|v| Runs::of(bitmap.row(v as i32)).map(move |run| (v, run)))
 }
 
-/// Whether the distance is flat here, by Sobel's sums.
-fn is_anchor(distance: &Plane<'_, u16>, u: usize, v: usize) -> bool {
-    let row = |v: usize| -> [i32; 3] {
-        let row = distance.row(v);
-        match row.get(u.wrapping_sub(1)..u + 2) {
-            Some(&[west, here, east]) => [west, here, east].map(i32::from),
-            _ => [u.wrapping_sub(1), u, u + 1].map(|u| i32::from(row.get(u).copied().unwrap_or(0))),
-        }
-    };
-    let [nw, n, ne] = row(v.wrapping_sub(1));
-    let [w, _, e] = row(v);
-    let [sw, s, se] = row(v + 1);
+/// The distance in a column of a row; 0 outside.
+fn value(row: &[u16], u: usize) -> u16 {
+    row.get(u).copied().unwrap_or(0)
+}
+
+/// Whether the distance is flat in a column of the middle one of three rows, by Sobel's sums.
+fn is_anchor(rows: [&[u16]; 3], u: usize) -> bool {
+    let [[nw, n, ne], [w, _, e], [sw, s, se]] = rows.map(|row| match row.get(u.wrapping_sub(1)..u + 2) {
+        Some(&[west, here, east]) => [west, here, east].map(i32::from),
+        _ => [u.wrapping_sub(1), u, u + 1].map(|u| i32::from(value(row, u))),
+    });
     let gx = (ne + 2 * e + se - nw - 2 * w - sw).unsigned_abs();
     if gx >= STEEP {
         return false;
