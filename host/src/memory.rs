@@ -2,7 +2,7 @@
 
 use shared::bitmap::{Size, Word};
 use shared::limits::CapacityError;
-use shared::pipeline::{Branch, EyeMemory, Kernels, Memory, scratch_words};
+use shared::pipeline::{Branch, EyeMemory, Memory, scratch_words};
 use shared::point::PixelPoint;
 use shared::stage::branch::Sample;
 use shared::stage::contour::{ContourLoop, ContourPoint};
@@ -12,7 +12,7 @@ use shared::stage::medial::MedialBall;
 use shared::stage::nearest::Pair;
 use shared::stage::nurbs::{Control, MAX_CONTROLS};
 use shared::stage::rows::ContourMatch;
-use shared::stage::thinning::scratch_order;
+use shared::stage::sequential_thinning::scratch_order;
 
 /// Contour points, path pixels and crossings: a silhouette of 3840x2160 has about 12,000.
 const POINTS: usize = 1 << 15;
@@ -111,7 +111,7 @@ impl Storage {
             boundary_pairs: &mut *self.boundary_pairs,
             skeleton_pairs: &mut *self.skeleton_pairs,
             scratch: &mut self.scratch,
-            kernels: Kernels::PORTABLE,
+            kernels: crate::wide::kernels(),
         }
     }
 }

@@ -241,7 +241,20 @@ impl<'a> Bitmap<'a> {
     }
 
     /// The eight neighbours of a pixel as a byte, bit 0 north, then clockwise: N NE E SE S SW W NW.
+    #[inline]
     pub fn neighbours(&self, u: i32, v: i32) -> u8 {
+        let (bit, place) = (u as usize % WORD_BITS, u as usize / WORD_BITS);
+        if bit == 0 || bit == WORD_BITS - 1 || !self.size.contains(u, v) {
+            return self.neighbours_apart(u, v);
+        }
+        let (n, i) = (self.size.row_words(), v as usize * self.size.row_words() + place);
+        let three = |i: usize| at(self.words, i) >> (bit - 1) & 0b111;
+        AROUND_OF_SQUARE[(three(i.wrapping_sub(n)) | three(i) << 3 | three(i + n) << 6) as usize]
+    }
+
+    /// [`Self::neighbours`], some of which lie in another word or outside.
+    #[cold]
+    fn neighbours_apart(&self, u: i32, v: i32) -> u8 {
         const AROUND: [(i32, i32); 8] =
             [(0, -1), (1, -1), (1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1)];
         AROUND.iter().enumerate().fold(0, |n, (k, (du, dv))| n | u8::from(self.get(u + du, v + dv)) << k)
@@ -252,6 +265,22 @@ impl<'a> Bitmap<'a> {
         neighbours_in_rows(self.row(v - 1), self.row(v), self.row(v + 1), i)
     }
 }
+
+/// [`Bitmap::neighbours`] of the square of 3x3 pixels whose rows are bits 0 to 2, 3 to 5 and 6 to 8.
+const AROUND_OF_SQUARE: [u8; 512] = {
+    const PLACES: [usize; 8] = [1, 2, 5, 8, 7, 6, 3, 0];
+    let mut around = [0; 512];
+    let mut square = 0;
+    while square < 512 {
+        let mut k = 0;
+        while k < 8 {
+            around[square] |= ((square >> PLACES[k] & 1) as u8) << k;
+            k += 1;
+        }
+        square += 1;
+    }
+    around
+};
 
 /// [`Bitmap::neighbour_words`] of word `i` of the row `here`, from the rows themselves.
 pub fn neighbours_in_rows(above: &[Word], here: &[Word], below: &[Word], i: usize) -> [Word; 8] {

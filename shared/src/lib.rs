@@ -8,6 +8,8 @@ pub mod arena;
 pub mod fixed;
 pub mod point;
 pub mod bitmap;
+pub mod pack;
+pub mod lanes;
 pub mod pattern;
 pub mod envelope;
 pub mod camera;

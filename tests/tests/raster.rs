@@ -12,7 +12,9 @@ use shared::stage::boundary::{self, Element};
 use shared::stage::clean::{self, Components};
 use shared::stage::distance::{self, Parabola};
 use shared::stage::hull::{self, RowExtent};
-use shared::stage::thinning::{self, Report, Rule};
+use shared::stage::parallel_thinning::{self, Parallel, Report};
+use shared::stage::sequential_thinning;
+use shared::stage::thinning::{self, Rule};
 
 const RULES: [Rule; 4] = [Rule::HitOrMiss, Rule::ZhangSuen, Rule::GuoHall, Rule::EdtOrdered];
 
@@ -73,10 +75,12 @@ fn thin(image: &Image, rule: Rule) -> (Image, Report) {
         let plane = distance::distance(bitmap, &mut data, &mut parabolas).unwrap();
         let largest = (0..size.height).flat_map(|v| plane.row(v)).copied().max().unwrap_or(0);
         let mut block = match rule {
-            Rule::EdtOrdered => vec![7; words::<u32>(thinning::scratch_order(bitmap.count(), largest))],
-            _ => vec![7; words::<Word>(thinning::scratch_words(size))],
+            Rule::EdtOrdered => {
+                vec![7; words::<u32>(sequential_thinning::scratch_order(bitmap.count(), largest))]
+            }
+            _ => vec![7; words::<Word>(parallel_thinning::scratch_words(size))],
         };
-        thinning::thin(bitmap, rule, &plane, Arena::new(&mut block)).unwrap()
+        thinning::thin(bitmap, (rule, parallel_thinning::thin), &plane, Arena::new(&mut block)).unwrap()
     })
 }
 
@@ -191,6 +195,36 @@ fn thinning_equals_its_twin() {
 }
 
 #[test]
+fn every_width_of_register_thins_alike() {
+    let widths = host::wide::widths();
+    for (name, thin) in widths {
+        if thin.is_none() {
+            eprintln!("\n!!!! SKIPPED: this machine has no {name}, so NOTHING is thinned in it !!!!\n");
+        }
+    }
+    let mut images: Vec<Image> = (1..=200usize)
+        .flat_map(|width| {
+            let (height, seed) = (1 + (7 * width) % 61, width as u64);
+            [naive::noise(width, height, 50 + seed % 45, seed), naive::blobs(width, 70 - height, seed)]
+        })
+        .collect();
+    // Blocks of more than one group of rows, and a last one that is not whole.
+    images.push(naive::noise(90, 2531, 95, 2));
+    for image in images {
+        for rule in [Parallel::HitOrMiss, Parallel::ZhangSuen, Parallel::GuoHall] {
+            let mut block = vec![7; words::<Word>(parallel_thinning::scratch_words(naive::size(&image)))];
+            let expected =
+                on_bitmap(&image, |b| parallel_thinning::thin(b, rule, Arena::new(&mut block)).unwrap());
+            for (name, thin) in widths.iter().filter_map(|(name, thin)| Some((name, (*thin)?))) {
+                block.fill(u64::MAX);
+                let found = on_bitmap(&image, |b| thin(b, rule, Arena::new(&mut block)).unwrap());
+                assert!(found == expected, "{name}, {rule:?}, {:?}", naive::size(&image));
+            }
+        }
+    }
+}
+
+#[test]
 fn thinning_of_all_neighbourhoods() {
     for code in 0..512 {
         let bit = |k: i32| code >> k & 1 == 1;
@@ -205,7 +239,7 @@ fn thinning_of_all_neighbourhoods() {
 fn simple_pixels_by_table_and_by_counting() {
     for code in 0..256usize {
         let around = std::array::from_fn(|k| (code >> k & 1) as u8);
-        assert_eq!(thinning::SIMPLE[code], naive::is_simple(around), "{code:08b}");
+        assert_eq!(sequential_thinning::SIMPLE[code], naive::is_simple(around), "{code:08b}");
     }
 }
 
@@ -234,7 +268,7 @@ fn minimal_skeletons_keep_their_topology() {
     for image in images() {
         for rule in RULES {
             let (skeleton, _) = thin(&image, rule);
-            let (thinned, deleted) = on_bitmap(&skeleton, thinning::minimal);
+            let (thinned, deleted) = on_bitmap(&skeleton, sequential_thinning::minimal);
             assert_eq!(thinned, naive::minimal(&skeleton));
             assert_eq!(naive::set(&skeleton).len() - naive::set(&thinned).len(), deleted as usize);
             assert_eq!(naive::topology(&thinned), naive::topology(&skeleton));
@@ -438,17 +472,24 @@ fn too_little_memory_is_an_error() {
         refused(distance::squared_distances(b, &mut data, &mut parabolas, &mut row, |_, _| ()));
         refused(boundary::boundary(b, Element::Square, &mut [0; 3]).map(drop));
         refused(hull::convex_hull(hull::bitmap_extents(b), &mut List::<_, 5>::new()));
-        let mut block = vec![0; words::<Word>(thinning::scratch_words(size)) - 1];
         let plane = distance::distance(b, &mut data, &mut parabolas).unwrap();
         for rule in RULES {
-            refused(thinning::thin(b, rule, &plane, Arena::new(&mut block)).map(drop));
+            let enough = match rule {
+                Rule::EdtOrdered => words::<u32>(sequential_thinning::scratch_order(b.count(), 16)),
+                _ => words::<Word>(parallel_thinning::scratch_words(size)),
+            };
+            let mut block = vec![0; enough - 1];
+            refused(
+                thinning::thin(b, (rule, parallel_thinning::thin), &plane, Arena::new(&mut block)).map(drop),
+            );
         }
     });
     on_bitmap(&image, |b| {
         // Distances of another size read as 0 outside: a worse order, no panic.
         let plane = Plane::over(Size::new(7, 3).unwrap(), &mut data).unwrap();
-        let mut block = vec![0; words::<u32>(thinning::scratch_order(b.count(), u16::MAX))];
-        thinning::thin(b, Rule::EdtOrdered, &plane, Arena::new(&mut block)).unwrap();
+        let mut block = vec![0; words::<u32>(sequential_thinning::scratch_order(b.count(), u16::MAX))];
+        thinning::thin(b, (Rule::EdtOrdered, parallel_thinning::thin), &plane, Arena::new(&mut block))
+            .unwrap();
     });
     let grey = Grey::new(size, size.width, &[0; 4800]).unwrap();
     refused(binarise::median(grey, &mut [0; 4799], binarise::median_row).map(drop));

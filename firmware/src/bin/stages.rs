@@ -17,7 +17,7 @@ mod board {
     use shared::bitmap::{Grey, Size};
     use shared::pipeline::{Memory, Settings, scratch_words};
     use shared::stage::depth::Optics;
-    use shared::stage::thinning::scratch_order;
+    use shared::stage::sequential_thinning::scratch_order;
     use static_cell::ConstStaticCell;
 
     const LARGEST: Capacities = Vga::CAPACITIES;

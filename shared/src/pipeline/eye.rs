@@ -16,6 +16,7 @@ use crate::stage::distance::{self, scratch_parabolas};
 use crate::stage::graph::{Graph, NodeKind};
 use crate::stage::nurbs::{self, FitParams};
 use crate::stage::prune;
+use crate::stage::sequential_thinning;
 use crate::stage::thinning;
 use heapless::VecView;
 
@@ -67,7 +68,7 @@ pub(super) fn skeleton(
     (side, size): (Side, Size),
     eye: &mut EyeMemory<'_>,
     mut scratch: Arena<'_>,
-    settings: &Settings,
+    (settings, kernels): (&Settings, &Kernels),
     gates: &mut Gates,
     observer: &mut impl Observer,
 ) -> Result<(), Finding> {
@@ -84,8 +85,9 @@ pub(super) fn skeleton(
         };
         saw(Product::Distance(&plane));
         skeleton.copy_from(&mask);
-        let thinned = thinning::thin(&mut skeleton, settings.thinning, &plane, scratch.fork())?;
-        thinning::minimal(&mut skeleton);
+        let thinned =
+            thinning::thin(&mut skeleton, (settings.thinning, kernels.thin), &plane, scratch.fork())?;
+        sequential_thinning::minimal(&mut skeleton);
         saw(Product::Skeleton(&skeleton, thinned));
         if skeleton.count() == 0 {
             gates.meet(Finding::SkeletonErased(side))?;
