@@ -23,9 +23,15 @@ pub const fn div_round(n: i64, d: i64) -> i64 {
     }
     // Quotients of i64::MIN would overflow; no stage comes near it.
     let half = d.unsigned_abs() / 2;
-    let q = n.unsigned_abs().saturating_add(half) / d.unsigned_abs();
+    let q = div_floor(n.unsigned_abs().saturating_add(half), d.unsigned_abs());
     let q = if q > i64::MAX as u64 { i64::MAX } else { q as i64 };
     if (n < 0) != (d < 0) { -q } else { q }
+}
+
+/// `n / d` rounded down; `d` is not 0. One instruction where both have 32 bits, as they nearly always have: a
+/// microcontroller divides longer ones in software.
+pub const fn div_floor(n: u64, d: u64) -> u64 {
+    if (n | d) >> 32 == 0 { (n as u32 / d as u32) as u64 } else { n / d }
 }
 
 /// `v` saturated to `i32`.

@@ -14,6 +14,7 @@ pub mod camera;
 
 // What happens to a picture.
 pub mod stage;
+pub mod strips;
 pub mod pipeline;
 
 // What of it goes over a link.

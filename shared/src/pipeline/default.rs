@@ -85,7 +85,7 @@ pub(super) fn lift_balls(
     observer: &mut impl Observer,
 ) -> Result<(), CapacityError> {
     let contour = &*memory.eyes[0].contour;
-    medial_balls(contour, memory.balls)?;
+    medial_balls(contour, Arena::new(memory.scratch), memory.balls)?;
     ball_depths(memory.balls, contour, memory.matches, optics, memory.depths)?;
     observer.saw(None, Product::Balls(memory.balls, memory.depths));
     Ok(())
