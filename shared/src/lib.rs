@@ -10,11 +10,11 @@ pub mod point;
 pub mod bitmap;
 pub mod pattern;
 pub mod envelope;
+pub mod strips;
 pub mod camera;
 
 // What happens to a picture.
 pub mod stage;
-pub mod strips;
 pub mod pipeline;
 
 // What of it goes over a link.
