@@ -67,7 +67,9 @@ pub(super) fn match_views(
     let [left, _] = &mut memory.eyes;
     left.samples.clear();
     left.branches.clear();
-    let balls = Balls { balls: memory.balls, depths: memory.depths };
+    let mut scratch = Arena::new(memory.scratch);
+    let strips = Balls::strips(memory.balls, &mut scratch)?;
+    let balls = Balls { balls: memory.balls, depths: memory.depths, strips: &strips };
     each_branch(&left.graph, |path, free, nodes, closed| {
         let start = left.samples.len();
         trace_branch(path, free, balls, left.samples)?;

@@ -5,8 +5,10 @@
 //! * **How**: a sample is the average of the balls whose centres lie within 2 px of the path's pixel,
 //!   weighted by (1 - (distance / 2 px)^2)^2. Thinning stops short of the last medial ball, most of all in
 //!   corners, so a free end is continued along its own direction from ball to ball.
-//! * **Cost**: path length times number of balls.
+//! * **Cost**: about 200 instructions a pixel of the path, and as many a ball of a tip; the logarithm of the
+//!   number of balls is in it.
 
+use crate::arena::Arena;
 use crate::bitmap::Plane;
 use crate::fixed::{ONE, PX, UNIT, div_round};
 use crate::limits::{CapacityError, push};
@@ -14,6 +16,7 @@ use crate::point::{Direction, Pixel, PixelPoint};
 use crate::stage::depth::BallDepth;
 use crate::stage::distance::DISTANCE_PX;
 use crate::stage::medial::MedialBall;
+use crate::strips::{Disc, Strips};
 use bytemuck::{Pod, Zeroable};
 use heapless::VecView;
 
@@ -61,6 +64,18 @@ pub struct Balls<'a> {
     pub balls: &'a [MedialBall],
     /// Disparities.
     pub depths: &'a [BallDepth],
+    /// Strips around the centres.
+    pub strips: &'a Strips<'a>,
+}
+
+impl<'a> Balls<'a> {
+    /// The strips of the balls' centres.
+    ///
+    /// # Errors
+    /// A [`CapacityError`] when the scratch is too short.
+    pub fn strips(balls: &[MedialBall], scratch: &mut Arena<'a>) -> Result<Strips<'a>, CapacityError> {
+        Strips::new(balls.len(), |k| balls[k].centre, scratch)
+    }
 }
 
 /// Balls farther than this from a path's pixel do not count, 1/256 px.
@@ -126,7 +141,8 @@ fn average(at: PixelPoint, balls: Balls<'_>) -> Option<Sample> {
     let reach_squared = i64::from(REACH).pow(2);
     let mut sums = [0i64; 5];
     let mut total = 0;
-    for (ball, depth) in balls.balls.iter().zip(balls.depths) {
+    balls.strips.walk(&mut Disc { centre: at, squared: reach_squared }, |k, _| {
+        let (ball, depth) = (&balls.balls[k], &balls.depths[k]);
         let near = reach_squared - at.distance_squared(ball.centre);
         if near > 0 {
             // At most 2^18 each; 24 bits of their product are kept, so that 2^16 balls fit.
@@ -137,7 +153,7 @@ fn average(at: PixelPoint, balls: Balls<'_>) -> Option<Sample> {
             }
             total += weight;
         }
-    }
+    });
     let [u, v, rho, d, weight] = sums.map(|s| div_round(s, total) as i32);
     (total > 0).then_some(Sample { ball: Ball { u, v, rho, d }, weight })
 }
@@ -154,16 +170,26 @@ fn continue_tip(start: usize, balls: Balls<'_>, samples: &mut VecView<Sample>) -
         let behind = samples[start.max(samples.len() - 1 - TIP_SPAN.min(samples.len() - 1))].ball;
         let Some(direction) = Direction::of(tip.u - behind.u, tip.v - behind.v) else { return Ok(()) };
         let across = Direction { u: -direction.v, v: direction.u };
-        let ahead = balls.balls.iter().zip(balls.depths).filter_map(|(ball, depth)| {
+        // Of equals the first.
+        let (mut step, mut next) = (TIP_REACH.min(left), None);
+        balls.strips.walk(&mut ahead(tip.at(), step), |k, disc| {
+            let ball = &balls.balls[k];
             let along = direction.along(tip.at(), ball.centre);
             let aside = across.along(tip.at(), ball.centre).abs();
-            let lies_ahead = along > TIP_STEP && along < TIP_REACH.min(left) && aside < PX + along / 10;
-            (lies_ahead && ball.rho <= tip.rho + PX / 4).then_some((along, ball, depth))
+            let lies_ahead = along > TIP_STEP && along < step && aside < PX + along / 10;
+            if lies_ahead && ball.rho <= tip.rho + PX / 4 {
+                (step, next, *disc) = (along, Some((ball, &balls.depths[k])), ahead(tip.at(), along));
+            }
         });
-        let Some((along, ball, depth)) = ahead.min_by_key(|(along, ..)| *along) else { return Ok(()) };
+        let Some((ball, depth)) = next else { return Ok(()) };
         push(samples, Sample::of(ball, depth), "branch samples")?;
-        left -= along;
+        left -= step;
     }
+}
+
+/// Whatever lies less than `step` ahead of a tip, and by little more than a tenth of that aside, is in here.
+fn ahead(tip: PixelPoint, step: i32) -> Disc {
+    Disc { centre: tip, squared: i64::from((step + step / 8 + 2 * PX).max(0)).pow(2) }
 }
 
 #[cfg(test)]
@@ -183,7 +209,9 @@ mod tests {
             (0..54).map(|k| BallDepth { disparity: 90 * PX + k, weight: 16384 }).collect();
         let path: Vec<_, 64> = (2..20).map(|u| Pixel { u, v: 10 }).collect();
         let mut samples = Vec::<_, 64>::new();
-        let all = Balls { balls: &balls, depths: &depths };
+        let mut block = [0; 64];
+        let strips = Balls::strips(&balls, &mut Arena::new(&mut block)).unwrap();
+        let all = Balls { balls: &balls, depths: &depths, strips: &strips };
         trace_branch(&path, [false, true], all, &mut samples).unwrap();
         assert!(samples.iter().all(|s| s.ball.v == 10 * PX + 40));
         assert!(samples.windows(2).all(|w| w[0].ball.u < w[1].ball.u && w[0].ball.rho > w[1].ball.rho));
