@@ -16,7 +16,7 @@
 //! * **Cost**: quadratic in the contour's length; multiplications only in the inner loop.
 //! * **Bounds**: squared lengths below 2^43, radius times dot product below 2^62.
 
-use crate::arena::Arena;
+use crate::arena::{Arena, List};
 use crate::fixed::{PX, div_floor};
 use crate::limits::{CapacityError, push};
 use crate::point::{Direction, PixelPoint};
@@ -49,54 +49,59 @@ pub fn medial_balls(
 ) -> Result<(), CapacityError> {
     balls.clear();
     let strips = Strips::new(points.len(), |i| points[i].at, &mut scratch)?;
+    let mut inside = List::new(scratch.take(points.len(), "points in a disc")?, "points in a disc");
     let mut near = 0;
     for i in 0..points.len() {
-        let Some(ball) = grow(points, &strips, i, near) else { continue };
-        near = ball.contacts[1] as usize;
-        if is_empty(points, &strips, &ball) {
-            push(balls, ball, "medial balls")?;
+        let Some(grown) = grow(points, &strips, (i, near), &mut inside)? else { continue };
+        near = grown.contact;
+        if is_empty(points, &strips, &grown, &inside) {
+            let contacts = [i as u32, grown.contact as u32];
+            push(balls, MedialBall { centre: grown.centre(), rho: grown.rho as i32, contacts }, "medial balls")?;
         }
     }
     Ok(())
 }
 
-/// A disc that touches a contour point from inside, while it shrinks.
+/// A disc that touches a contour point from inside.
 #[derive(Clone, Copy)]
-struct Growth {
+struct Touching {
     at: PixelPoint,
     inward: Direction,
-    /// Length of `inward`, 1/16384, rounded up.
-    length: i64,
+    /// Squared length of `inward`, 1/2^28.
+    squared: u32,
     /// Radius, 1/256 px.
     rho: i64,
-    /// The point that it was last shrunk to.
-    contact: Option<usize>,
+    /// The point that it was last shrunk to; its own point before.
+    contact: usize,
 }
 
-/// What a point means to a disc that touches another one.
+/// What a point is to a disc that touches another one.
 enum Sight {
-    /// Not inside, or more than 60 degrees from the normal.
-    Nothing,
+    /// It lies outside.
+    Outside,
+    /// It lies inside, more than 60 degrees from the normal.
+    Aside,
     /// It shrinks the disc to this radius.
     Shrinks(i64),
-    /// It would if the disc were larger than this.
-    TooFar(i64),
+    /// It would, were the disc larger than this: at twice the radius, where rounding makes inside and outside.
+    Beyond(i64),
 }
 
-impl Growth {
+impl Touching {
     fn sight(&self, q: PixelPoint) -> Sight {
         let height = i64::from(self.inward.along(self.at, q));
         if height <= 0 {
-            return Sight::Nothing;
+            return Sight::Outside;
         }
         let distance_squared = self.at.distance_squared(q);
-        if distance_squared >= 2 * self.rho * height || 4 * height * height < distance_squared {
-            return Sight::Nothing;
-        }
-        if height < 2 * self.rho {
-            Sight::Shrinks(div_floor(distance_squared as u64, 2 * height as u64) as i64)
+        if distance_squared >= 2 * self.rho * height {
+            Sight::Outside
+        } else if 4 * height * height < distance_squared {
+            Sight::Aside
+        } else if height >= 2 * self.rho {
+            Sight::Beyond(height / 2)
         } else {
-            Sight::TooFar(height / 2)
+            Sight::Shrinks(div_floor(distance_squared as u64, 2 * height as u64) as i64)
         }
     }
 
@@ -105,56 +110,65 @@ impl Growth {
         PixelPoint { u: self.at.u + offset(self.inward.u), v: self.at.v + offset(self.inward.v) }
     }
 
-    /// Every point that shrinks it lies in here: |q - p|^2 < 2 rho n . (q - p) is a disc about p + rho n of
-    /// radius rho |n|; two units more are for rounding.
+    /// Every point that is not outside lies in here: |q - p|^2 < 2 rho n . (q - p) is a disc about p + rho n
+    /// of radius rho |n|; two units more are for rounding.
     fn disc(&self) -> Disc {
-        let radius = ((self.rho * self.length) >> 14) + 2;
+        let length = i64::from(self.squared.isqrt()) + 1;
+        let radius = ((self.rho * length) >> 14) + 2;
         Disc { centre: self.centre(), squared: radius * radius }
     }
 }
 
-/// The largest disc that touches point `i` from inside and no point within 60 degrees of its normal.
-fn grow(points: &[ContourPoint], strips: &Strips<'_>, i: usize, near: usize) -> Option<MedialBall> {
+/// The largest disc that touches point `i` from inside and no point within 60 degrees of its normal; the
+/// points aside that may lie in it are listed. A contact is looked for at point `near` first.
+fn grow(
+    points: &[ContourPoint],
+    strips: &Strips<'_>,
+    (i, near): (usize, usize),
+    inside: &mut List<'_, u32>,
+) -> Result<Option<Touching>, CapacityError> {
     let (at, inward) = (points[i].at, points[i].normal.reversed());
     let (u, v) = (i32::from(inward.u), i32::from(inward.v));
-    let length = i64::from((u * u + v * v).cast_unsigned().isqrt()) + 1;
-    let mut start = Growth { at, inward, length, rho: i64::from(i32::MAX >> 4), contact: None };
+    let squared = (u * u + v * v).cast_unsigned();
+    let mut start = Touching { at, inward, squared, rho: i64::from(i32::MAX >> 4), contact: i };
     for q in &points[near.saturating_sub(1)..points.len().min(near + 2)] {
         if let Sight::Shrinks(rho) = start.sight(q.at) {
             start.rho = rho.max(i64::from(inward.along(at, q.at)) / 2) + 1;
         }
     }
-    let grown = loop {
-        let (mut growth, mut larger) = (start, None);
-        strips.walk(&mut start.disc(), |j, disc| match growth.sight(points[j].at) {
+    loop {
+        inside.clear();
+        let (mut grown, mut larger, mut full) = (start, None, Ok(()));
+        strips.walk(&mut start.disc(), |j, disc| match grown.sight(points[j].at) {
+            Sight::Outside => {}
             Sight::Shrinks(rho) => {
-                (growth.rho, growth.contact) = (rho, Some(j));
-                *disc = growth.disc();
+                (grown.rho, grown.contact) = (rho, j);
+                *disc = grown.disc();
             }
-            Sight::TooFar(rho) if growth.contact.is_none() => {
+            Sight::Beyond(rho) if grown.contact == i => {
                 larger = Some(rho + 1);
                 disc.squared = 0;
             }
-            _ => {}
+            Sight::Aside | Sight::Beyond(_) => full = inside.push(j as u32).and(full),
         });
+        full?;
         match larger {
             Some(rho) => start.rho = rho,
-            None => break growth,
+            None => return Ok(Some(grown).filter(|g| g.contact != i && g.rho > 0)),
         }
-    };
-    let rho = grown.rho as i32;
-    grown.contact.filter(|_| rho > 0).map(|j| MedialBall { centre: grown.centre(), rho, contacts: [i as u32, j as u32] })
+    }
 }
 
-/// Whether no contour point lies deep inside the ball.
-fn is_empty(points: &[ContourPoint], strips: &Strips<'_>, ball: &MedialBall) -> bool {
-    let least = i64::from((ball.rho - SLACK).max(0)).pow(2);
+/// Whether no contour point lies deep inside the disc.
+fn is_empty(points: &[ContourPoint], strips: &Strips<'_>, grown: &Touching, inside: &[u32]) -> bool {
+    let (centre, least) = (grown.centre(), (grown.rho - i64::from(SLACK)).max(0).pow(2));
+    let lies_deep = |j: usize| centre.distance_squared(points[j].at) < least;
+    // Where the normal is not much too short, whatever lies deep was seen inside.
+    if grown.rho * ((1 << 28) - i64::from(grown.squared)) <= i64::from(SLACK - 3) << 28 {
+        return !inside.iter().any(|&j| lies_deep(j as usize));
+    }
     let mut empty = true;
-    strips.walk(&mut Disc { centre: ball.centre, squared: least }, |j, disc| {
-        if ball.centre.distance_squared(points[j].at) < least {
-            (empty, disc.squared) = (false, 0);
-        }
-    });
+    strips.walk(&mut Disc { centre, squared: least }, |j, _| empty &= !lies_deep(j));
     empty
 }
 
@@ -174,7 +188,7 @@ mod tests {
         };
         let points: Vec<_, 120> = (0..120).map(wall).collect();
         let mut balls = Vec::<_, 120>::new();
-        medial_balls(&points, Arena::new(&mut [0; 256]), &mut balls).unwrap();
+        medial_balls(&points, Arena::new(&mut [0; 128]), &mut balls).unwrap();
         assert_eq!(balls.len(), 120);
         for ball in &balls {
             assert_eq!((ball.centre.v, ball.rho), (10 * PX, 10 * PX));
