@@ -4,7 +4,7 @@
 //! them lie in a rectangle along their chord, four such stretches in a longer one, and so on (Ballard,
 //! "Strip trees", 1981). The hierarchy is implicit: stretches begin at multiples of their length.
 //!
-//! * **In**: points, |u|, |v| < 2^20, by number; scratch for a strip of 20 bytes per six points.
+//! * **In**: points, |u|, |v| < 2^20, by number; scratch for a strip of 24 bytes per six points.
 //! * **Out**: every point inside a disc, in the order of their numbers, and a few others.
 //! * **How**: a rectangle's axes are no longer than 1, so that no length measured along them is too long, and its
 //!   sides lie one unit farther out than its points do, so that no rounding brings a point into the disc
@@ -17,13 +17,16 @@ use crate::fixed::UNIT;
 use crate::limits::CapacityError;
 use crate::point::PixelPoint;
 use bytemuck::{Pod, Zeroable};
+use core::ops::Range;
 
 /// Bits of the number of points in the shortest strip.
 const LEAF_BITS: u32 = 3;
 /// Bits of the number of strips in a longer one.
 const FAN_BITS: u32 = 2;
-/// Most levels: those of 2^25 points.
-const MAX_LEVELS: usize = 12;
+/// How many of the longest strips there are at most.
+const MOST_LONGEST: usize = 8;
+/// The level of the longest strips that there can be, of 2^25 points.
+const MAX_LEVEL: u32 = 11;
 
 /// A disc that points are looked for in.
 #[derive(Clone, Copy, Debug)]
@@ -44,18 +47,19 @@ struct Strip {
     low: [i32; 2],
     /// Greatest coordinates along it and across.
     high: [i32; 2],
+    level: u32,
 }
 
 impl Strip {
-    /// The strip of points number `from..to`, at least one.
-    fn around(at: &impl Fn(usize) -> PixelPoint, from: usize, to: usize) -> Self {
-        let axis = axis(at(from), at(to - 1));
+    /// The strip of a stretch of at least one point.
+    fn around(at: &impl Fn(usize) -> PixelPoint, stretch: Range<usize>, level: u32) -> Self {
+        let axis = axis(at(stretch.start), at(stretch.end - 1));
         let (mut low, mut high) = ([i32::MAX; 2], [i32::MIN; 2]);
-        for i in from..to {
+        for i in stretch {
             let [s, t] = turned(axis, at(i));
             (low, high) = ([low[0].min(s), low[1].min(t)], [high[0].max(s), high[1].max(t)]);
         }
-        Self { axis, low: low.map(|x| x - 1), high: high.map(|x| x + 1) }
+        Self { axis, low: low.map(|x| x - 1), high: high.map(|x| x + 1), level }
     }
 
     /// Whether it certainly has no point inside the disc.
@@ -84,19 +88,21 @@ fn turned([a, b]: [i16; 2], p: PixelPoint) -> [i32; 2] {
     [((a * u + b * v) >> 14) as i32, ((a * v - b * u) >> 14) as i32]
 }
 
-/// The strips of a row of points.
+/// The strips of a row of points: each before the shorter ones in it.
 #[derive(Debug)]
 pub struct Strips<'a> {
     points: usize,
-    /// Where each level begins, the shortest strips first.
-    first: [usize; MAX_LEVELS],
-    levels: usize,
     strips: &'a [Strip],
 }
 
-/// How many points a strip of a level has.
-const fn length(level: usize) -> usize {
-    1 << (LEAF_BITS + FAN_BITS * level as u32)
+/// How many points a strip of a level has; level 0 is the shortest.
+const fn length(level: u32) -> usize {
+    1 << (LEAF_BITS + FAN_BITS * level)
+}
+
+/// How many strips one of a level is with those in it.
+const fn family(level: u32) -> usize {
+    ((1 << (FAN_BITS * (level + 1))) - 1) / ((1 << FAN_BITS) - 1)
 }
 
 impl<'a> Strips<'a> {
@@ -109,45 +115,35 @@ impl<'a> Strips<'a> {
         at: impl Fn(usize) -> PixelPoint,
         scratch: &mut Arena<'a>,
     ) -> Result<Self, CapacityError> {
-        let (mut first, mut levels, mut count) = ([0; MAX_LEVELS], 0, 0);
-        loop {
-            first[levels] = count;
-            let here = points.div_ceil(length(levels));
-            count += here;
-            levels += 1;
-            if here <= 1 << FAN_BITS || levels == MAX_LEVELS {
-                break;
-            }
-        }
+        let longest = (0..MAX_LEVEL).find(|&level| points <= length(level) * MOST_LONGEST).unwrap_or(MAX_LEVEL);
+        let count = (0..=longest).map(|level| points.div_ceil(length(level))).sum();
         let strips = scratch.take::<Strip>(count, "strips")?;
-        let stretches = (0..levels).flat_map(|level| (0..points).step_by(length(level)).map(move |i| (level, i)));
-        for (strip, (level, from)) in strips.iter_mut().zip(stretches) {
-            *strip = Strip::around(&at, from, points.min(from + length(level)));
+        let starts = (0..points).step_by(length(0)).flat_map(|from| {
+            let begin_here = move |level: &u32| from % length(*level) == 0;
+            (0..=longest).rev().filter(begin_here).map(move |level| (from, level))
+        });
+        for (strip, (from, level)) in strips.iter_mut().zip(starts) {
+            *strip = Strip::around(&at, from..points.min(from + length(level)), level);
         }
-        Ok(Self { points, first, levels, strips })
+        Ok(Self { points, strips })
     }
 
     /// Show every point inside the disc, and a few others, in order; the disc may shrink on the way.
     pub fn walk(&self, disc: &mut Disc, mut visit: impl FnMut(usize, &mut Disc)) {
-        let mut i = 0;
-        while i < self.points {
-            // The longest strip that begins here, then shorter ones, until one is apart.
-            let mut level = (i.trailing_zeros().saturating_sub(LEAF_BITS) / FAN_BITS) as usize;
-            level = level.min(self.levels - 1);
-            loop {
-                let strip = &self.strips[self.first[level] + i / length(level)];
-                if strip.is_apart(disc) {
-                    i += length(level);
-                    break;
+        let (mut i, mut from) = (0, 0);
+        while let Some(strip) = self.strips.get(i) {
+            if strip.is_apart(disc) {
+                i += family(strip.level);
+                from += length(strip.level);
+                continue;
+            }
+            i += 1;
+            if strip.level == 0 {
+                let to = self.points.min(from + length(0));
+                for point in from..to {
+                    visit(point, disc);
                 }
-                if level == 0 {
-                    for j in i..self.points.min(i + length(0)) {
-                        visit(j, disc);
-                    }
-                    i += length(0);
-                    break;
-                }
-                level -= 1;
+                from = to;
             }
         }
     }

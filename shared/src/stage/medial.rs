@@ -17,7 +17,7 @@
 //! * **Bounds**: squared lengths below 2^43, radius times dot product below 2^62.
 
 use crate::arena::{Arena, List};
-use crate::fixed::{PX, div_floor};
+use crate::fixed::{PX, UNIT, div_floor};
 use crate::limits::{CapacityError, push};
 use crate::point::{Direction, PixelPoint};
 use crate::stage::contour::ContourPoint;
@@ -37,6 +37,9 @@ pub struct MedialBall {
 
 /// How deep a contour point may lie in a ball, 1/256 px: the contour's own noise.
 const SLACK: i32 = PX * 2 / 5;
+
+/// Less high above the tangent no point lies deep, nearly one, see [`is_empty`].
+const LEAST_HEIGHT: i64 = SLACK as i64 / 3;
 
 /// The medial balls of a contour, in the order of the points that they grow from.
 ///
@@ -67,8 +70,9 @@ pub fn medial_balls(
 struct Touching {
     at: PixelPoint,
     inward: Direction,
-    /// Squared length of `inward`, 1/2^28.
+    /// Squared length of `inward`, 1/2^28, and the length, 1/16384: (x^2 + 1) / 2, no less than x and hardly more.
     squared: u32,
+    length: i64,
     /// Radius, 1/256 px.
     rho: i64,
     /// The point that it was last shrunk to; its own point before.
@@ -77,7 +81,7 @@ struct Touching {
 
 /// What a point is to a disc that touches another one.
 enum Sight {
-    /// It lies outside.
+    /// It lies outside, or hardly inside and beside the disc's own point.
     Outside,
     /// It lies inside, more than 60 degrees from the normal.
     Aside,
@@ -94,9 +98,10 @@ impl Touching {
             return Sight::Outside;
         }
         let distance_squared = self.at.distance_squared(q);
-        if distance_squared >= 2 * self.rho * height {
+        let is_aside = 4 * height * height < distance_squared;
+        if is_aside && height < LEAST_HEIGHT || distance_squared >= 2 * self.rho * height {
             Sight::Outside
-        } else if 4 * height * height < distance_squared {
+        } else if is_aside {
             Sight::Aside
         } else if height >= 2 * self.rho {
             Sight::Beyond(height / 2)
@@ -113,8 +118,7 @@ impl Touching {
     /// Every point that is not outside lies in here: |q - p|^2 < 2 rho n . (q - p) is a disc about p + rho n
     /// of radius rho |n|; two units more are for rounding.
     fn disc(&self) -> Disc {
-        let length = i64::from(self.squared.isqrt()) + 1;
-        let radius = ((self.rho * length) >> 14) + 2;
+        let radius = ((self.rho * self.length) >> 14) + 2;
         Disc { centre: self.centre(), squared: radius * radius }
     }
 }
@@ -130,7 +134,8 @@ fn grow(
     let (at, inward) = (points[i].at, points[i].normal.reversed());
     let (u, v) = (i32::from(inward.u), i32::from(inward.v));
     let squared = (u * u + v * v).cast_unsigned();
-    let mut start = Touching { at, inward, squared, rho: i64::from(i32::MAX >> 4), contact: i };
+    let length = i64::from((squared >> 14) + UNIT as u32) / 2 + 1;
+    let mut start = Touching { at, inward, squared, length, rho: i64::from(i32::MAX >> 4), contact: i };
     for q in &points[near.saturating_sub(1)..points.len().min(near + 2)] {
         if let Sight::Shrinks(rho) = start.sight(q.at) {
             start.rho = rho.max(i64::from(inward.along(at, q.at)) / 2) + 1;
@@ -163,8 +168,11 @@ fn grow(
 fn is_empty(points: &[ContourPoint], strips: &Strips<'_>, grown: &Touching, inside: &[u32]) -> bool {
     let (centre, least) = (grown.centre(), (grown.rho - i64::from(SLACK)).max(0).pow(2));
     let lies_deep = |j: usize| centre.distance_squared(points[j].at) < least;
-    // Where the normal is not much too short, whatever lies deep was seen inside.
-    if grown.rho * ((1 << 28) - i64::from(grown.squared)) <= i64::from(SLACK - 3) << 28 {
+    // With S the slack and x the normal's length, let rho (1 - x^2) be at most S / 2, which it always is of rounded
+    // normals. Then whatever lies deep was seen inside, and is LEAST_HEIGHT high: the disc of radius rho - S begins
+    // x (S - rho (1 - x)) > S / 2 above the tangent, and heights are cut by less than 1, which
+    // rho^2 (1 - x^2) + (S - 1)^2 < 2 rho (S - 2) allows for.
+    if grown.rho * ((1 << 28) - i64::from(grown.squared)) <= i64::from(SLACK / 2) << 28 {
         return !inside.iter().any(|&j| lies_deep(j as usize));
     }
     let mut empty = true;
