@@ -5,7 +5,7 @@
 //! "Strip trees", 1981). The hierarchy is implicit: stretches begin at multiples of their length.
 //!
 //! * **In**: points, |u|, |v| < 2^20, by number; scratch for a strip of 24 bytes per six points.
-//! * **Out**: every point inside a disc, in the order of their numbers, and a few others.
+//! * **Out**: the points inside a disc, in the order of their numbers.
 //! * **How**: a rectangle's axes are no longer than 1, so that no length measured along them is too long, and its
 //!   sides lie one unit farther out than its points do, so that no rounding brings a point into the disc
 //!   that the rectangle is held apart from.
@@ -17,7 +17,6 @@ use crate::fixed::UNIT;
 use crate::limits::CapacityError;
 use crate::point::PixelPoint;
 use bytemuck::{Pod, Zeroable};
-use core::ops::Range;
 
 /// Bits of the number of points in the shortest strip.
 const LEAF_BITS: u32 = 3;
@@ -27,6 +26,18 @@ const FAN_BITS: u32 = 2;
 const MOST_LONGEST: usize = 8;
 /// The level of the longest strips that there can be, of 2^25 points.
 const MAX_LEVEL: u32 = 11;
+
+/// What has a place in the plane.
+pub trait Placed {
+    /// Where it is; |u|, |v| < 2^20.
+    fn place(&self) -> PixelPoint;
+}
+
+impl Placed for PixelPoint {
+    fn place(&self) -> PixelPoint {
+        *self
+    }
+}
 
 /// A disc that points are looked for in.
 #[derive(Clone, Copy, Debug)]
@@ -51,12 +62,13 @@ struct Strip {
 }
 
 impl Strip {
-    /// The strip of a stretch of at least one point.
-    fn around(at: &impl Fn(usize) -> PixelPoint, stretch: Range<usize>, level: u32) -> Self {
-        let axis = axis(at(stretch.start), at(stretch.end - 1));
+    /// The strip of some points.
+    fn around(stretch: &[impl Placed], level: u32) -> Self {
+        let end = |point: Option<&_>| point.map(Placed::place).unwrap_or_default();
+        let axis = axis(end(stretch.first()), end(stretch.last()));
         let (mut low, mut high) = ([i32::MAX; 2], [i32::MIN; 2]);
-        for i in stretch {
-            let [s, t] = turned(axis, at(i));
+        for point in stretch {
+            let [s, t] = turned(axis, point.place());
             (low, high) = ([low[0].min(s), low[1].min(t)], [high[0].max(s), high[1].max(t)]);
         }
         Self { axis, low: low.map(|x| x - 1), high: high.map(|x| x + 1), level }
@@ -90,8 +102,8 @@ fn turned([a, b]: [i16; 2], p: PixelPoint) -> [i32; 2] {
 
 /// The strips of a row of points: each before the shorter ones in it.
 #[derive(Debug)]
-pub struct Strips<'a> {
-    points: usize,
+pub struct Strips<'a, P> {
+    points: &'a [P],
     strips: &'a [Strip],
 }
 
@@ -105,45 +117,43 @@ const fn family(level: u32) -> usize {
     ((1 << (FAN_BITS * (level + 1))) - 1) / ((1 << FAN_BITS) - 1)
 }
 
-impl<'a> Strips<'a> {
-    /// The strips of `points` points, of which `at` tells the places.
+impl<'a, P: Placed> Strips<'a, P> {
+    /// The strips of a row of points.
     ///
     /// # Errors
     /// A [`CapacityError`] when the scratch is too short.
-    pub fn new(
-        points: usize,
-        at: impl Fn(usize) -> PixelPoint,
-        scratch: &mut Arena<'a>,
-    ) -> Result<Self, CapacityError> {
-        let longest = (0..MAX_LEVEL).find(|&level| points <= length(level) * MOST_LONGEST).unwrap_or(MAX_LEVEL);
-        let count = (0..=longest).map(|level| points.div_ceil(length(level))).sum();
-        let strips = scratch.take::<Strip>(count, "strips")?;
-        let starts = (0..points).step_by(length(0)).flat_map(|from| {
+    pub fn new<'s: 'a>(points: &'a [P], scratch: &mut Arena<'s>) -> Result<Self, CapacityError> {
+        let count = points.len();
+        let longest = (0..MAX_LEVEL).find(|&level| count <= length(level) * MOST_LONGEST).unwrap_or(MAX_LEVEL);
+        let all = (0..=longest).map(|level| count.div_ceil(length(level))).sum();
+        let strips = scratch.take::<Strip>(all, "strips")?;
+        let starts = (0..count).step_by(length(0)).flat_map(|from| {
             let begin_here = move |level: &u32| from % length(*level) == 0;
             (0..=longest).rev().filter(begin_here).map(move |level| (from, level))
         });
         for (strip, (from, level)) in strips.iter_mut().zip(starts) {
-            *strip = Strip::around(&at, from..points.min(from + length(level)), level);
+            *strip = Strip::around(&points[from..count.min(from + length(level))], level);
         }
         Ok(Self { points, strips })
     }
 
-    /// Show every point inside the disc, and a few others, in order; the disc may shrink on the way.
-    pub fn walk(&self, disc: &mut Disc, mut visit: impl FnMut(usize, &mut Disc)) {
+    /// Show every point inside the disc, in order: its number, itself, and the disc, which may shrink on the way.
+    pub fn walk(&self, mut disc: Disc, mut visit: impl FnMut(usize, &'a P, &mut Disc)) {
         let (mut i, mut from) = (0, 0);
         while let Some(strip) = self.strips.get(i) {
-            if strip.is_apart(disc) {
+            if strip.is_apart(&disc) {
                 i += family(strip.level);
                 from += length(strip.level);
                 continue;
             }
             i += 1;
             if strip.level == 0 {
-                let to = self.points.min(from + length(0));
-                for point in from..to {
-                    visit(point, disc);
+                for (k, point) in self.points.iter().enumerate().skip(from).take(length(0)) {
+                    if disc.centre.distance_squared(point.place()) < disc.squared {
+                        visit(k, point, &mut disc);
+                    }
                 }
-                from = to;
+                from += length(0);
             }
         }
     }

@@ -68,11 +68,10 @@ pub(super) fn match_views(
     left.samples.clear();
     left.branches.clear();
     let mut scratch = Arena::new(memory.scratch);
-    let strips = Balls::strips(memory.balls, &mut scratch)?;
-    let balls = Balls { balls: memory.balls, depths: memory.depths, strips: &strips };
+    let balls = Balls::new(memory.balls, memory.depths, &mut scratch)?;
     each_branch(&left.graph, |path, free, nodes, closed| {
         let start = left.samples.len();
-        trace_branch(path, free, balls, left.samples)?;
+        trace_branch(path, free, &balls, left.samples)?;
         add_branch(left.branches, left.samples, start, nodes, closed)
     })?;
     fit_curves(left, Arena::new(memory.scratch), &settings.curves)?;

@@ -58,25 +58,25 @@ impl Sample {
 }
 
 /// The medial balls of a view with their depths, in the same order.
-#[derive(Clone, Copy)]
 pub struct Balls<'a> {
-    /// Centres, radii and contacts.
-    pub balls: &'a [MedialBall],
-    /// Disparities.
-    pub depths: &'a [BallDepth],
-    /// Strips around the centres.
-    pub strips: &'a Strips<'a>,
+    depths: &'a [BallDepth],
+    strips: Strips<'a, MedialBall>,
 }
 
 impl<'a> Balls<'a> {
-    /// The strips of the balls' centres.
+    /// Balls that can be found by their places.
     ///
     /// # Errors
     /// A [`CapacityError`] when the scratch is too short.
-    pub fn strips(balls: &[MedialBall], scratch: &mut Arena<'a>) -> Result<Strips<'a>, CapacityError> {
-        Strips::new(balls.len(), |k| balls[k].centre, scratch)
+    pub fn new<'s: 'a>(
+        balls: &'a [MedialBall],
+        depths: &'a [BallDepth],
+        scratch: &mut Arena<'s>,
+    ) -> Result<Self, CapacityError> {
+        Ok(Self { depths, strips: Strips::new(balls, scratch)? })
     }
 }
+
 
 /// Balls farther than this from a path's pixel do not count, 1/256 px.
 const REACH: i32 = 2 * PX;
@@ -97,7 +97,7 @@ const TIP_SPAN: usize = 8;
 pub fn trace_branch(
     path: &[Pixel],
     free: [bool; 2],
-    balls: Balls<'_>,
+    balls: &Balls<'_>,
     samples: &mut VecView<Sample>,
 ) -> Result<(), CapacityError> {
     let start = samples.len();
@@ -137,29 +137,26 @@ pub fn trace_pixels(
 }
 
 /// The weighted average of the balls around a point.
-fn average(at: PixelPoint, balls: Balls<'_>) -> Option<Sample> {
+fn average(at: PixelPoint, balls: &Balls<'_>) -> Option<Sample> {
     let reach_squared = i64::from(REACH).pow(2);
     let mut sums = [0i64; 5];
     let mut total = 0;
-    balls.strips.walk(&mut Disc { centre: at, squared: reach_squared }, |k, _| {
-        let (ball, depth) = (&balls.balls[k], &balls.depths[k]);
+    balls.strips.walk(Disc { centre: at, squared: reach_squared }, |k, ball, _| {
         let near = reach_squared - at.distance_squared(ball.centre);
-        if near > 0 {
-            // At most 2^18 each; 24 bits of their product are kept, so that 2^16 balls fit.
-            let weight = (near * near) >> 12;
-            let Sample { ball: Ball { u, v, rho, d }, weight: trust } = Sample::of(ball, depth);
-            for (sum, value) in sums.iter_mut().zip([u, v, rho, d, trust]) {
-                *sum += weight * i64::from(value);
-            }
-            total += weight;
+        // At most 2^18 each; 24 bits of their product are kept, so that 2^16 balls fit.
+        let weight = (near * near) >> 12;
+        let Sample { ball: Ball { u, v, rho, d }, weight: trust } = Sample::of(ball, &balls.depths[k]);
+        for (sum, value) in sums.iter_mut().zip([u, v, rho, d, trust]) {
+            *sum += weight * i64::from(value);
         }
+        total += weight;
     });
     let [u, v, rho, d, weight] = sums.map(|s| div_round(s, total) as i32);
     (total > 0).then_some(Sample { ball: Ball { u, v, rho, d }, weight })
 }
 
 /// Continue the samples from `start` beyond the last one, from ball to ball ahead that does not grow.
-fn continue_tip(start: usize, balls: Balls<'_>, samples: &mut VecView<Sample>) -> Result<(), CapacityError> {
+fn continue_tip(start: usize, balls: &Balls<'_>, samples: &mut VecView<Sample>) -> Result<(), CapacityError> {
     if samples.len() - start < TIP_MIN {
         return Ok(());
     }
@@ -172,8 +169,7 @@ fn continue_tip(start: usize, balls: Balls<'_>, samples: &mut VecView<Sample>) -
         let across = Direction { u: -direction.v, v: direction.u };
         // Of equals the first.
         let (mut step, mut next) = (TIP_REACH.min(left), None);
-        balls.strips.walk(&mut ahead(tip.at(), step), |k, disc| {
-            let ball = &balls.balls[k];
+        balls.strips.walk(ahead(tip.at(), step), |k, ball, disc| {
             let along = direction.along(tip.at(), ball.centre);
             let aside = across.along(tip.at(), ball.centre).abs();
             let lies_ahead = along > TIP_STEP && along < step && aside < PX + along / 10;
@@ -210,9 +206,8 @@ mod tests {
         let path: Vec<_, 64> = (2..20).map(|u| Pixel { u, v: 10 }).collect();
         let mut samples = Vec::<_, 64>::new();
         let mut block = [0; 64];
-        let strips = Balls::strips(&balls, &mut Arena::new(&mut block)).unwrap();
-        let all = Balls { balls: &balls, depths: &depths, strips: &strips };
-        trace_branch(&path, [false, true], all, &mut samples).unwrap();
+        let all = Balls::new(&balls, &depths, &mut Arena::new(&mut block)).unwrap();
+        trace_branch(&path, [false, true], &all, &mut samples).unwrap();
         assert!(samples.iter().all(|s| s.ball.v == 10 * PX + 40));
         assert!(samples.windows(2).all(|w| w[0].ball.u < w[1].ball.u && w[0].ball.rho > w[1].ball.rho));
         let last = samples.last().unwrap().ball.u;

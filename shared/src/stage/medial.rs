@@ -21,7 +21,7 @@ use crate::fixed::{PX, UNIT, div_floor};
 use crate::limits::{CapacityError, push};
 use crate::point::{Direction, PixelPoint};
 use crate::stage::contour::ContourPoint;
-use crate::strips::{Disc, Strips};
+use crate::strips::{Disc, Placed, Strips};
 use heapless::VecView;
 
 /// A disc inside the silhouette that touches its contour in two places.
@@ -33,6 +33,18 @@ pub struct MedialBall {
     pub rho: i32,
     /// The two contour points that it touches; the ball was grown from the first.
     pub contacts: [u32; 2],
+}
+
+impl Placed for MedialBall {
+    fn place(&self) -> PixelPoint {
+        self.centre
+    }
+}
+
+impl Placed for ContourPoint {
+    fn place(&self) -> PixelPoint {
+        self.at
+    }
 }
 
 /// How deep a contour point may lie in a ball, 1/256 px: the contour's own noise.
@@ -51,7 +63,7 @@ pub fn medial_balls(
     balls: &mut VecView<MedialBall>,
 ) -> Result<(), CapacityError> {
     balls.clear();
-    let strips = Strips::new(points.len(), |i| points[i].at, &mut scratch)?;
+    let strips = Strips::new(points, &mut scratch)?;
     let mut inside = List::new(scratch.take(points.len(), "points in a disc")?, "points in a disc");
     let mut near = 0;
     for i in 0..points.len() {
@@ -127,7 +139,7 @@ impl Touching {
 /// points aside that may lie in it are listed. A contact is looked for at point `near` first.
 fn grow(
     points: &[ContourPoint],
-    strips: &Strips<'_>,
+    strips: &Strips<'_, ContourPoint>,
     (i, near): (usize, usize),
     inside: &mut List<'_, u32>,
 ) -> Result<Option<Touching>, CapacityError> {
@@ -144,7 +156,7 @@ fn grow(
     loop {
         inside.clear();
         let (mut grown, mut larger, mut full) = (start, None, Ok(()));
-        strips.walk(&mut start.disc(), |j, disc| match grown.sight(points[j].at) {
+        strips.walk(start.disc(), |j, q, disc| match grown.sight(q.at) {
             Sight::Outside => {}
             Sight::Shrinks(rho) => {
                 (grown.rho, grown.contact) = (rho, j);
@@ -165,18 +177,22 @@ fn grow(
 }
 
 /// Whether no contour point lies deep inside the disc.
-fn is_empty(points: &[ContourPoint], strips: &Strips<'_>, grown: &Touching, inside: &[u32]) -> bool {
+fn is_empty(
+    points: &[ContourPoint],
+    strips: &Strips<'_, ContourPoint>,
+    grown: &Touching,
+    inside: &[u32],
+) -> bool {
     let (centre, least) = (grown.centre(), (grown.rho - i64::from(SLACK)).max(0).pow(2));
-    let lies_deep = |j: usize| centre.distance_squared(points[j].at) < least;
     // With S the slack and x the normal's length, let rho (1 - x^2) be at most S / 2, which it always is of rounded
     // normals. Then whatever lies deep was seen inside, and is LEAST_HEIGHT high: the disc of radius rho - S begins
     // x (S - rho (1 - x)) > S / 2 above the tangent, and heights are cut by less than 1, which
     // rho^2 (1 - x^2) + (S - 1)^2 < 2 rho (S - 2) allows for.
     if grown.rho * ((1 << 28) - i64::from(grown.squared)) <= i64::from(SLACK / 2) << 28 {
-        return !inside.iter().any(|&j| lies_deep(j as usize));
+        return inside.iter().all(|&j| centre.distance_squared(points[j as usize].at) >= least);
     }
     let mut empty = true;
-    strips.walk(&mut Disc { centre, squared: least }, |j, _| empty &= !lies_deep(j));
+    strips.walk(Disc { centre, squared: least }, |_, _, _| empty = false);
     empty
 }
 
