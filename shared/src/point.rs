@@ -32,7 +32,7 @@ pub struct PixelPoint {
 }
 
 impl PixelPoint {
-    /// Squared distance, in (1/256 px)^2; below 2^43, and below 2^58 of points within 2^28.
+    /// Squared distance, in (1/256 px)^2; below 2^43.
     pub const fn distance_squared(self, other: Self) -> i64 {
         let (du, dv) = ((self.u - other.u) as i64, (self.v - other.v) as i64);
         du * du + dv * dv

@@ -42,7 +42,7 @@ impl Placed for PixelPoint {
 /// A disc that points are looked for in.
 #[derive(Clone, Copy, Debug)]
 pub struct Disc {
-    /// Centre; |u|, |v| < 2^28.
+    /// Centre; |u|, |v| < 2^30 + 2^21.
     pub centre: PixelPoint,
     /// Squared radius, (1/256 px)^2; points that far away are outside, and nothing is inside 0.
     pub squared: i64,
