@@ -124,7 +124,8 @@ impl<'a, P: Placed> Strips<'a, P> {
     /// A [`CapacityError`] when the scratch is too short.
     pub fn new<'s: 'a>(points: &'a [P], scratch: &mut Arena<'s>) -> Result<Self, CapacityError> {
         let count = points.len();
-        let longest = (0..MAX_LEVEL).find(|&level| count <= length(level) * MOST_LONGEST).unwrap_or(MAX_LEVEL);
+        let longest =
+            (0..MAX_LEVEL).find(|&level| count <= length(level) * MOST_LONGEST).unwrap_or(MAX_LEVEL);
         let all = (0..=longest).map(|level| count.div_ceil(length(level))).sum();
         let strips = scratch.take::<Strip>(all, "strips")?;
         let starts = (0..count).step_by(length(0)).flat_map(|from| {

@@ -77,7 +77,6 @@ impl<'a> Balls<'a> {
     }
 }
 
-
 /// Balls farther than this from a path's pixel do not count, 1/256 px.
 const REACH: i32 = 2 * PX;
 /// The next ball beyond a free end is at least this far and at most that far ahead, 1/256 px.

@@ -71,7 +71,11 @@ pub fn medial_balls(
         near = grown.contact;
         if is_empty(points, &strips, &grown, &inside) {
             let contacts = [i as u32, grown.contact as u32];
-            push(balls, MedialBall { centre: grown.centre(), rho: grown.rho as i32, contacts }, "medial balls")?;
+            push(
+                balls,
+                MedialBall { centre: grown.centre(), rho: grown.rho as i32, contacts },
+                "medial balls",
+            )?;
         }
     }
     Ok(())

@@ -86,7 +86,8 @@ impl ImagePlane {
         }
         let mean = |sum: i64| (sum / total) as i32;
         let (origin, level) = (PixelPoint { u: mean(sums.u), v: mean(sums.v) }, mean(sums.d));
-        let [weight, mean_u, mean_v, mean_d] = [total, origin.u.into(), origin.v.into(), level.into()].map(i128::from);
+        let [weight, mean_u, mean_v, mean_d] =
+            [total, origin.u.into(), origin.v.into(), level.into()].map(i128::from);
         // sum w (x - m) (y - n) = sum w x y - m sum w y - n sum w x + m n sum w, whatever m and n are.
         let centred = |xy: i128, (x, m): (i64, i128), (y, n): (i64, i128)| {
             xy - m * i128::from(y) - n * i128::from(x) + m * n * weight
