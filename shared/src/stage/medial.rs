@@ -50,7 +50,7 @@ impl Placed for ContourPoint {
 /// How deep a contour point may lie in a ball, 1/256 px: the contour's own noise.
 const SLACK: i32 = PX * 2 / 5;
 
-/// Less high above the tangent no point lies deep, nearly one, see [`is_empty`].
+/// A point that is less high above the tangent does not lie deep, see [`is_empty`].
 const LEAST_HEIGHT: i64 = SLACK as i64 / 3;
 
 /// The medial balls of a contour, in the order of the points that they grow from.
@@ -80,6 +80,9 @@ pub fn medial_balls(
     }
     Ok(())
 }
+
+/// The radius of a disc that nothing has stopped yet, 1/256 px.
+const UNLIMITED: i64 = (i32::MAX >> 4) as i64;
 
 /// A disc that touches a contour point from inside.
 #[derive(Clone, Copy)]
@@ -126,6 +129,14 @@ impl Touching {
         }
     }
 
+    /// Make it as small as a point allows that shrinks it, but for one unit: the disc searched for is smaller, and
+    /// the point shrinks this one still.
+    fn narrow(&mut self, q: PixelPoint) {
+        if let Sight::Shrinks(rho) = self.sight(q) {
+            self.rho = rho.max(i64::from(self.inward.along(self.at, q)) / 2) + 1;
+        }
+    }
+
     fn centre(&self) -> PixelPoint {
         let offset = |n: i16| ((self.rho * i64::from(n) + (1 << 13)) >> 14) as i32;
         PixelPoint { u: self.at.u + offset(self.inward.u), v: self.at.v + offset(self.inward.v) }
@@ -151,10 +162,17 @@ fn grow(
     let (u, v) = (i32::from(inward.u), i32::from(inward.v));
     let squared = (u * u + v * v).cast_unsigned();
     let length = i64::from((squared >> 14) + UNIT as u32) / 2 + 1;
-    let mut start = Touching { at, inward, squared, length, rho: i64::from(i32::MAX >> 4), contact: i };
+    let mut start = Touching { at, inward, squared, length, rho: UNLIMITED, contact: i };
     for q in &points[near.saturating_sub(1)..points.len().min(near + 2)] {
-        if let Sight::Shrinks(rho) = start.sight(q.at) {
-            start.rho = rho.max(i64::from(inward.along(at, q.at)) / 2) + 1;
+        start.narrow(q.at);
+    }
+    if start.rho == UNLIMITED {
+        strips.walk(start.disc(), |_, q, disc| {
+            start.narrow(q.at);
+            *disc = start.disc();
+        });
+        if start.rho == UNLIMITED {
+            return Ok(None);
         }
     }
     loop {
