@@ -9,11 +9,12 @@
 //! * **How**: a disc that touches contour point p with normal n has its centre on the normal. It touches
 //!   another point q when its radius is |q - p|^2 / (2 n . (q - p)), n pointing inwards, so the largest empty
 //!   disc has the least such radius over all q: the fixed point of the shrinking-ball method (Ma, Bae and
-//!   Choi 2012), found in one pass. Points q seen at more than 60 degrees from the normal are left
+//!   Choi 2012), found in one pass in the order of the points. Points q seen at more than 60 degrees from the normal are left
 //!   out: there the separation angle p - centre - q is below 60 degrees, and the disc is born of noise of
 //!   the contour itself.
 //! * **Kept** are balls with no contour point more than 0.4 px inside.
-//! * **Cost**: quadratic in the contour's length; multiplications only in the inner loop.
+//! * **Cost**: a point begins with its neighbour's contact and looks only at the strips ([`Strips`]) that its disc
+//!   meets, 20 to 50 of any contour; on a circle, where every disc is the same, at all points (decisions/0013).
 //! * **Bounds**: squared lengths below 2^43, radius times dot product below 2^62.
 
 use crate::arena::{Arena, List};
