@@ -12,6 +12,7 @@ pub mod pack;
 pub mod lanes;
 pub mod pattern;
 pub mod envelope;
+pub mod strips;
 pub mod camera;
 
 // What happens to a picture.
