@@ -1,172 +1,420 @@
-//! The lattice, and the blocks of it in which the surface can pass.
+//! The blocks of the lattice near the surface: which of their points are inside, and where these stand.
 //!
-//! A signed distance changes by at most the way walked. So when its size in the middle of a cube exceeds
-//! the cube's reach there is no surface in it, and a cone that is further from the middle than the
-//! nearest one by twice the reach is the nearest nowhere in the cube. From one cube around the solid both
-//! rules are applied to its eight children, and so on down: the cost follows the surface, not the volume.
+//! A signed distance changes by at most the way walked. So when its size in the middle of a region exceeds
+//! the region's reach there is no surface in it. From one cube around the solid this rule is applied to its
+//! eight children, and so on down to leaves of two cubes a side, each with the cones that can be the
+//! nearest in it (`Grower::hand_down`): the cost follows the surface, not the volume.
+//!
+//! Points that are too near the surface are moved off it, by less than would turn a tetrahedron inside out,
+//! so that no cut passes close to a corner and no face degenerates; isosurface stuffing (Labelle and
+//! Shewchuk 2007) moves them onto it instead, where a sign is lost.
 
-use nalgebra::{Point3, Vector3};
-use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
-use super::{RoundCone, distance::Distance};
+use nalgebra::Point3;
 
-/// Cubes along the side of a block.
-pub(super) const SIDE: i32 = 4;
+use super::{
+    bundle::{Answers, Bundle, ROUNDING, SITES, prepare},
+    distance::Distance,
+    lattice::{LOWERED, Lattice, MAX_SHIFT, SIDE, point_of},
+};
 
-/// A block takes about 6 kB of mesh, so that this many take 0.4 GB, about as much again when joined.
-const MAX_BLOCKS: usize = 1 << 16;
+/// A block takes about 8 kB with its cones, and about 6 kB of mesh, so that this many take 1 GB.
+pub(super) const MAX_BLOCKS: usize = 1 << 16;
 
-/// The blocks along a side of the outermost cube: an edge's name has 21 bits an axis
-/// ([`Lattice::name`]), which is 2^18 cubes, less the margin.
-const MAX_BLOCKS_ALONG: i32 = 1 << 15;
+/// Points are moved to at least this distance off the surface, in cubes. Twice that is the most that one
+/// is moved: from just outside to inside.
+const CLEAR: f64 = MAX_SHIFT / 2.0;
 
-/// How far off the origin the solid may be, in cubes: there a coordinate still resolves 2e-10 cubes.
-const MAX_OFFSET: f64 = (1u32 << 20) as f64;
+/// Cubes along the side of a leaf.
+const LEAF: i32 = 2;
 
-/// Rounding, in cubes, of distances and of what their slopes add up to over a block: a coordinate's, times
-/// the largest lean of a cone, times the reach of a block in cubes.
-pub(super) const SLACK: f64 = 1e-5;
+/// An edge that the surface cuts is up to a cube and two shifts long: so far off the surface its ends are.
+const EDGE: f32 = 1.5;
 
-/// How far a lattice point may be moved, in cubes. A tetrahedron is half a cube wide at its narrowest, so
-/// below a quarter none can turn inside out.
-pub(super) const MAX_SHIFT: f64 = 0.24;
+/// Nearer than this to the middle of the ball that decides, rounding blurs how the distance grows; cubes.
+const BLUR: f32 = 0.5;
 
-/// A body-centred cubic lattice: the points whose three integer coordinates, in half cubes, are all even
-/// (corners of the cubes) or all odd (their middles).
-pub(super) struct Lattice {
-    /// The point (0, 0, 0), mm: at least two cubes below the solid on each axis, at a multiple of the
-    /// cube so that a solid that grows keeps its points.
-    origin: Point3<f64>,
-    /// Edge of a cube, mm.
-    pub(super) cube: f64,
-    /// Longest side of the solid's bounding box, mm.
-    pub(super) size: f64,
+/// A region of the lattice that is to be divided.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Region {
+    /// Its lowest corner, in half cubes.
+    pub(super) corner: [i32; 3],
+    /// Lattice cubes along its side.
+    pub(super) cubes: i32,
 }
 
-/// A cube of the lattice in which the surface may pass.
+impl Region {
+    fn octant(&self, octant: usize) -> Self {
+        let half = self.cubes / 2;
+        let bit = |axis: usize| (octant >> (2 - axis) & 1) as i32;
+        Self { corner: [0, 1, 2].map(|axis| self.corner[axis] + bit(axis) * half * 2), cubes: half }
+    }
+}
+
+/// A block: [`SIDE`]^3 cubes of the lattice near the surface.
+#[derive(Debug)]
 pub(super) struct Block {
     /// Its lowest corner, in half cubes.
     pub(super) corner: [i32; 3],
-    /// Its middle, mm.
-    pub(super) middle: Point3<f64>,
-    /// The cones that are the nearest one somewhere in it, ascending.
+    /// Corners of cubes, and middles, that are inside.
+    pub(super) inside: [u64; 2],
+    /// Those that have been moved.
+    moved: [u64; 2],
+    /// Where the moved ones stand in [`Grove::moved`]; corners first.
+    first_moved: u32,
+    leaves: [Leaf; 8],
+    /// The cone that decides the distance of each point, corners first.
+    cones: [u32; 128],
+}
+
+/// An eighth of a block.
+#[derive(Clone, Copy, Debug)]
+struct Leaf {
+    /// Its cones in [`Grove::cones`]; none where the surface does not pass.
+    first_cone: u32,
+    cones: u32,
+    /// In [`Grove::fields`].
+    first_field: usize,
+    /// The cone nearest to its middle.
+    nearest: u32,
+}
+
+/// The blocks under one region, with what belongs to them.
+#[derive(Debug, Default)]
+pub(super) struct Grove {
+    pub(super) blocks: Vec<Block>,
+    moved: Vec<Point3<f64>>,
+    cones: Vec<u32>,
+    fields: Vec<f32>,
+    /// Of the regions on the way down, by level.
+    levels: Vec<Level>,
+    answers: Answers,
+    distances: Vec<f32>,
+}
+
+#[derive(Debug, Default)]
+pub(super) struct Level {
     pub(super) cones: Vec<u32>,
+    fields: Vec<f32>,
 }
 
-impl Lattice {
-    /// A lattice with cubes of `cube` mm around all `cones`.
-    pub(super) fn around(cones: &[RoundCone], cube: f64) -> Self {
-        let mut low = Point3::from(Vector3::repeat(f64::INFINITY));
-        let mut high = -low;
-        for cone in cones {
-            for (centre, &radius) in cone.centres.iter().zip(&cone.radii) {
-                low = low.inf(&(centre - Vector3::repeat(radius)));
-                high = high.sup(&(centre + Vector3::repeat(radius)));
-            }
+/// What all regions have in common.
+#[derive(Clone, Copy)]
+pub(super) struct Solid<'a> {
+    pub(super) lattice: &'a Lattice,
+    pub(super) distances: &'a [Distance],
+}
+
+/// What the distance is in the middle of a region, in cubes, and the cone that decides it.
+#[derive(Clone, Copy)]
+struct Middle {
+    distance: f32,
+    nearest: u32,
+}
+
+/// How far the corners of a region of `cubes` a side are from its middle, in cubes.
+fn reach(cubes: i32) -> f32 {
+    cubes as f32 * 0.866_025_5
+}
+
+/// Offsets of the points of a leaf from its middle, and their squares, in cubes: corners of cubes first.
+const OFFSETS: [[f32; SITES]; 4] = {
+    let mut offsets = [[0.0; SITES]; 4];
+    let mut i = 0;
+    while i < SITES {
+        let lowest = if i < 8 { -0.75 } else { -0.25 };
+        let mut axis = 0;
+        while axis < 3 {
+            let x = lowest + (i >> (2 - axis) & 1) as f32;
+            offsets[axis][i] = x;
+            offsets[3][i] += x * x;
+            axis += 1;
         }
-        Self { origin: low.map(|x| ((x / cube).floor() - 2.0) * cube), cube, size: (high - low).max() }
+        i += 1;
     }
+    offsets
+};
 
-    /// Where a lattice point is before any shift, mm.
-    pub(super) fn position(&self, point: [i32; 3]) -> Point3<f64> {
-        self.origin + Vector3::from(point).map(f64::from) * (self.cube / 2.0)
-    }
+/// The bit in a block of a cube of one of its leaves.
+fn bit_of(leaf: usize, cube: usize) -> usize {
+    let spread = |octant: usize| (octant >> 2) << 4 | (octant >> 1 & 1) << 2 | octant & 1;
+    spread(leaf) << 1 | spread(cube)
+}
 
-    /// One number for the edge between two lattice points: its middle, which no other edge has.
-    pub(super) fn name(a: [i32; 3], b: [i32; 3]) -> u64 {
-        (0..3).fold(0, |name, axis| (name << 21) | u64::from((a[axis] + b[axis]).cast_unsigned()))
-    }
-
-    /// The blocks near the surface in an order that depends on the solid alone, or nothing if there are
-    /// too many.
-    pub(super) fn blocks_near_surface(&self, distances: &[Distance]) -> Option<Vec<Block>> {
-        let mut along = self.blocks_along()?;
-        let all = (0..u32::try_from(distances.len()).ok()?).collect();
-        let mut blocks = vec![Block { corner: [0; 3], middle: self.middle([0; 3], along), cones: all }];
-        while along > 1 {
-            along /= 2;
-            blocks = blocks
-                .par_iter()
-                .flat_map_iter(|parent| {
-                    (0..8).filter_map(move |octant| {
-                        let corner = [0, 1, 2]
-                            .map(|axis| parent.corner[axis] + ((octant >> axis) & 1) * along * SIDE * 2);
-                        self.block(corner, along, &parent.cones, distances)
-                    })
-                })
-                .collect();
-            if blocks.len() > MAX_BLOCKS {
-                return None;
-            }
+/// Writes to `below` the cones of `bundle` that may be the nearest somewhere in a region of `cubes` a side,
+/// whose middle is `offset` cubes from the bundle's; nothing if the surface passes nowhere within `margin`.
+fn hand_down(
+    bundle: &Bundle,
+    offset: [f32; 3],
+    (cubes, margin): (i32, f32),
+    answers: &mut Answers,
+    below: &mut Vec<u32>,
+) -> Middle {
+    bundle.ask(offset, answers);
+    let Answers { distance, from_centre, growth: [gx, gy, gz] } = answers;
+    let mut best = 0;
+    for i in 0..bundle.cones.len() {
+        if distance[i] < distance[best] {
+            best = i;
         }
-        Some(blocks)
     }
-
-    /// How far from a block's middle the points of its tetrahedra can be, mm, when it is `along` blocks
-    /// wide: they stick out by half a cube, and may have been moved.
-    pub(super) fn reach(&self, along: i32) -> f64 {
-        let half_side = f64::from(along * SIDE + 1) / 2.0;
-        self.cube * (half_side * 3.0_f64.sqrt() + MAX_SHIFT + SLACK)
+    let middle = Middle { distance: distance[best], nearest: bundle.cones[best] };
+    let reach = reach(cubes);
+    let rounding = ROUNDING * (from_centre[best] + reach);
+    if middle.distance.abs() > reach + margin + rounding {
+        return middle;
     }
-
-    /// Blocks along the side of the cube around the solid, a power of two.
-    fn blocks_along(&self) -> Option<i32> {
-        let far = self.origin.coords.amax() / self.cube;
-        let cubes = self.size / self.cube + 5.0;
-        // Comparisons this way round refuse what overflowed to infinity or became no number.
-        if !(far < MAX_OFFSET && cubes <= f64::from(MAX_BLOCKS_ALONG * SIDE)) {
-            return None;
+    let bend = reach * reach / (2.0 * from_centre[best]);
+    for (i, &cone) in bundle.cones.iter().enumerate() {
+        let further = distance[i] - distance[best] - rounding - ROUNDING * from_centre[i];
+        let apart = [gx[i] - gx[best], gy[i] - gy[best], gz[i] - gz[best]];
+        let turned = (apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2]).sqrt();
+        let never = further > 2.0 * reach || (from_centre[i] > BLUR && further > turned * reach + bend);
+        if !never {
+            below.push(cone);
         }
-        let mut along = 1;
-        while f64::from(along * SIDE) < cubes {
-            along *= 2;
-        }
-        Some(along)
     }
+    middle
+}
 
-    fn middle(&self, corner: [i32; 3], along: i32) -> Point3<f64> {
-        self.position(corner.map(|x| x + along * SIDE))
-    }
-
-    /// The block at `corner`, unless it is all inside or all outside.
-    fn block(&self, corner: [i32; 3], along: i32, cones: &[u32], distances: &[Distance]) -> Option<Block> {
-        let middle = self.middle(corner, along);
-        let reach = self.reach(along);
-        let from_middle: Vec<f64> = cones.iter().map(|&cone| distances[cone as usize].at(&middle)).collect();
-        let nearest = from_middle.iter().copied().fold(f64::INFINITY, f64::min);
-        if nearest.abs() > reach {
-            return None;
-        }
-        let may_be_nearest = cones.iter().zip(&from_middle).filter(|&(_, &far)| far <= nearest + 2.0 * reach);
-        Some(Block { corner, middle, cones: may_be_nearest.map(|(&cone, _)| cone).collect() })
+impl Solid<'_> {
+    fn middle(&self, region: Region) -> Point3<f64> {
+        self.lattice.middle(region.corner, region.cubes)
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn blocks_follow_the_surface_and_not_the_volume() {
-        let ball = RoundCone { centres: [Point3::origin(); 2], radii: [50.0; 2] };
-        let count =
-            |cube| Lattice::around(&[ball], cube).blocks_near_surface(&[Distance::to(&ball)]).unwrap().len();
-        let (coarse, fine) = (count(1.0), count(0.5));
-        assert!((3.5..4.5).contains(&(fine as f64 / coarse as f64)), "{coarse} {fine}");
+impl Level {
+    /// Makes this the level of `region`, of which it has the cones already.
+    fn prepare(&mut self, solid: &Solid, region: Region) {
+        self.fields.clear();
+        prepare(&self.cones, solid.distances, &solid.middle(region), solid.lattice.cube, &mut self.fields);
     }
 
-    #[test]
-    fn edges_of_a_point_have_names_of_their_own() {
-        let point = [8, 10, 6];
-        let mut names: Vec<u64> = (-2..=2)
-            .flat_map(|x| (-2..=2).flat_map(move |y| (-2..=2).map(move |z| [x, y, z])))
-            .filter(|step: &[i32; 3]| {
-                matches!(step.map(|x| x.abs()), [2, 0, 0] | [0, 2, 0] | [0, 0, 2] | [1, 1, 1])
-            })
-            .map(|step| Lattice::name(point, [0, 1, 2].map(|axis| point[axis] + step[axis])))
-            .collect();
-        names.sort_unstable();
-        names.dedup();
-        assert_eq!(names.len(), 14);
+    /// Puts the cones of the children of `region`, where the surface can pass near, one list after another.
+    pub(super) fn divide(
+        &mut self,
+        solid: &Solid,
+        region: Region,
+        cones: &mut Vec<u32>,
+        mut child: impl FnMut(Region, std::ops::Range<usize>),
+    ) {
+        self.prepare(solid, region);
+        let bundle = Bundle::new(&self.cones, &self.fields, solid.middle(region));
+        let mut answers = Answers::default();
+        for octant in 0..8 {
+            let start = cones.len();
+            let octant = Octant::of(region, octant);
+            hand_down(&bundle, octant.offset, (octant.region.cubes, EDGE), &mut answers, cones);
+            if cones.len() > start {
+                child(octant.region, start..cones.len());
+            }
+        }
+    }
+}
+
+/// One of the eight children of a region.
+struct Octant {
+    region: Region,
+    /// Of its middle from that of its parent, cubes.
+    offset: [f32; 3],
+}
+
+impl Octant {
+    fn of(parent: Region, octant: usize) -> Self {
+        let region = parent.octant(octant);
+        let quarter = parent.cubes as f32 / 4.0;
+        let offset = [0, 1, 2].map(|axis| if octant >> (2 - axis) & 1 == 1 { quarter } else { -quarter });
+        Self { region, offset }
+    }
+}
+
+impl Grove {
+    /// Finds the blocks of `region`, of which `cones` may be the nearest ones. `found` counts the blocks of
+    /// all groves, which stop when there are too many.
+    pub(super) fn grow(&mut self, solid: &Solid, region: Region, cones: &[u32], found: &AtomicUsize) {
+        self.blocks.clear();
+        self.moved.clear();
+        self.cones.clear();
+        self.fields.clear();
+        let mut levels = std::mem::take(&mut self.levels);
+        let depth = (region.cubes / SIDE).trailing_zeros() as usize + 1;
+        if levels.len() < depth {
+            levels.resize_with(depth, Level::default);
+        }
+        levels[0].cones.clear();
+        levels[0].cones.extend(cones);
+        self.descend(solid, region, &mut levels, found);
+        self.levels = levels;
+    }
+
+    fn descend(&mut self, solid: &Solid, region: Region, levels: &mut [Level], found: &AtomicUsize) {
+        let (level, below) = levels.split_first_mut().expect("a level for each division");
+        level.prepare(solid, region);
+        let bundle = Bundle::new(&level.cones, &level.fields, solid.middle(region));
+        if region.cubes == SIDE {
+            if found.fetch_add(1, Ordering::Relaxed) < MAX_BLOCKS {
+                self.plant(solid, region, &bundle);
+            }
+            return;
+        }
+        for octant in 0..8 {
+            let octant = Octant::of(region, octant);
+            below[0].cones.clear();
+            let extent = (octant.region.cubes, EDGE);
+            hand_down(&bundle, octant.offset, extent, &mut self.answers, &mut below[0].cones);
+            if !below[0].cones.is_empty() {
+                self.descend(solid, octant.region, below, found);
+            }
+        }
+    }
+
+    /// Adds the block that is `region`.
+    fn plant(&mut self, solid: &Solid, region: Region, bundle: &Bundle) {
+        let leaf = Leaf { first_cone: 0, cones: 0, first_field: 0, nearest: 0 };
+        let mut block = Block {
+            corner: region.corner,
+            inside: [0; 2],
+            moved: [0; 2],
+            first_moved: self.moved.len() as u32,
+            leaves: [leaf; 8],
+            cones: [0; 128],
+        };
+        let mut moved = [[Point3::origin(); 64]; 2];
+        for octant in 0..8 {
+            let Octant { region, offset } = Octant::of(region, octant);
+            let first_cone = self.cones.len();
+            let middle = hand_down(bundle, offset, (LEAF, 0.0), &mut self.answers, &mut self.cones);
+            let leaf = Leaf {
+                first_cone: first_cone as u32,
+                cones: (self.cones.len() - first_cone) as u32,
+                first_field: self.fields.len(),
+                nearest: middle.nearest,
+            };
+            block.leaves[octant] = leaf;
+            if leaf.cones == 0 {
+                for i in 0..SITES {
+                    let (kind, bit) = (i >> 3, bit_of(octant, i & 7));
+                    block.inside[kind] |= u64::from(middle.distance < 0.0) << bit;
+                    block.cones[64 * kind + bit] = middle.nearest;
+                }
+                continue;
+            }
+            let centre = solid.middle(region);
+            let cones = &self.cones[first_cone..];
+            prepare(cones, solid.distances, &centre, solid.lattice.cube, &mut self.fields);
+            let bundle = Bundle::new(cones, &self.fields[leaf.first_field..], centre);
+            let (distances, places) = bundle.nearest_of_sites(&OFFSETS);
+            for i in 0..SITES {
+                let (kind, bit) = (i >> 3, bit_of(octant, i & 7));
+                let cone = cones[places[i] as usize];
+                let blur = 4.0 * ROUNDING * (distances[i].abs() + 4.0 + (solid.distances[cone as usize].radius / solid.lattice.cube) as f32);
+                if distances[i].abs() > CLEAR as f32 + blur {
+                    block.inside[kind] |= u64::from(distances[i] < 0.0) << bit;
+                    block.cones[64 * kind + bit] = cone;
+                    continue;
+                }
+                let unmoved = solid.lattice.position(point_of(region.corner, bit_of(0, i & 7), kind));
+                let site = bundle.site(unmoved, solid, &mut self.distances);
+                block.inside[kind] |= u64::from(site.distance < 0.0) << bit;
+                block.cones[64 * kind + bit] = site.cone;
+                if site.position != unmoved {
+                    block.moved[kind] |= 1 << bit;
+                    moved[kind][bit] = site.position;
+                }
+            }
+        }
+        for kind in 0..2 {
+            self.moved.extend(bits(block.moved[kind]).map(|bit| moved[kind][bit]));
+        }
+        self.blocks.push(block);
+    }
+
+    /// Where a point of `block` stands, mm.
+    pub(super) fn position(&self, solid: &Solid, block: &Block, kind: usize, bit: usize) -> Point3<f64> {
+        if block.moved[kind] >> bit & 1 == 0 {
+            return solid.lattice.position(point_of(block.corner, bit, kind));
+        }
+        let before = block.moved[kind] & ((1 << bit) - 1);
+        let others = if kind == 1 { block.moved[0].count_ones() } else { 0 };
+        self.moved[(block.first_moved + others + before.count_ones()) as usize]
+    }
+
+    /// The signed distance of `p`, which is in the given leaf of `block`, and the cone that decides it; of a
+    /// leaf in which the surface does not pass, a bound of the distance.
+    pub(super) fn nearest(
+        &self,
+        solid: &Solid,
+        (block, octant): (&Block, usize),
+        p: &Point3<f64>,
+        answers: &mut Vec<f32>,
+    ) -> (f64, u32) {
+        let leaf = &block.leaves[octant];
+        if leaf.cones == 0 {
+            return (solid.distances[leaf.nearest as usize].at(p), leaf.nearest);
+        }
+        let cones = &self.cones[leaf.first_cone as usize..][..leaf.cones as usize];
+        let region = Region { corner: block.corner, cubes: SIDE }.octant(octant);
+        let bundle = Bundle::new(cones, &self.fields[leaf.first_field..], solid.middle(region));
+        bundle.nearest(p, solid.lattice.cube, solid.distances, answers)
+    }
+}
+
+impl Block {
+    /// The cone that decides the distance of a point.
+    pub(super) fn cone(&self, kind: usize, bit: usize) -> u32 {
+        self.cones[64 * kind + bit]
+    }
+
+    /// The block ahead, as in [`super::lattice::seen_ahead`], and the leaf of it in which `p` is.
+    pub(super) fn leaf_of(&self, lattice: &Lattice, p: &Point3<f64>) -> (usize, usize) {
+        let from_corner = (p - lattice.position(self.corner)) / lattice.cube;
+        let leaf = |axis: usize| ((from_corner[axis] + LOWERED).max(0.0) / f64::from(LEAF)) as usize;
+        let [x, y, z] = [leaf(0), leaf(1), leaf(2)];
+        ((x >> 1) << 2 | (y >> 1) << 1 | z >> 1, (x & 1) << 2 | (y & 1) << 1 | z & 1)
+    }
+}
+
+/// The places of the ones of a word.
+pub(super) fn bits(mut word: u64) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let bit = word.trailing_zeros() as usize;
+        (word != 0).then(|| {
+            word &= word - 1;
+            bit
+        })
+    })
+}
+
+/// A lattice point near the surface, moved off it.
+struct Site {
+    position: Point3<f64>,
+    /// Signed distance there, mm.
+    distance: f64,
+    cone: u32,
+}
+
+impl Bundle<'_> {
+    /// The lattice point at `position`, moved until it is [`CLEAR`] of the surface.
+    fn site(&self, position: Point3<f64>, solid: &Solid, answers: &mut Vec<f32>) -> Site {
+        let cube = solid.lattice.cube;
+        let clear = CLEAR * cube;
+        let (distance, cone) = self.nearest(&position, cube, solid.distances, answers);
+        let unmoved = Site { position, distance, cone };
+        if distance.abs() >= clear {
+            return unmoved;
+        }
+        let Some(outward) = solid.distances[cone as usize].outward(&position, 0.0) else {
+            return unmoved;
+        };
+        // Away from the surface; but from a crease outward there is no getting away, only inward.
+        for target in [clear.copysign(distance), -clear] {
+            let position = position + outward * (target - distance);
+            let (distance, cone) = self.nearest(&position, cube, solid.distances, answers);
+            if distance.abs() > 0.99 * clear {
+                return Site { position, distance, cone };
+            }
+        }
+        unmoved
     }
 }

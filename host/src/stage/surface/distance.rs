@@ -16,17 +16,17 @@ const CONTAINED: f64 = 1.0 - 1e-8;
 /// A round cone made ready for many distance queries.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Distance {
-    start: Point3<f64>,
+    pub(super) start: Point3<f64>,
     /// Unit vector towards the other end; zero for one ball.
-    axis: Vector3<f64>,
+    pub(super) axis: Vector3<f64>,
     /// Between the centres, mm; zero for one ball.
-    length: f64,
+    pub(super) length: f64,
     /// At the start, mm.
-    radius: f64,
+    pub(super) radius: f64,
     /// Growth of the radius along the axis, within (-1, 1).
-    slope: f64,
+    pub(super) slope: f64,
     /// Tangent of the side's angle to the axis.
-    lean: f64,
+    pub(super) lean: f64,
 }
 
 impl Distance {
@@ -58,6 +58,39 @@ impl Distance {
         (p - (self.start + self.axis * s)).try_normalize(blur)
     }
 
+    /// Where the ray from `from` by `step` leaves the cone, as a share of the step; none if it does not meet
+    /// it.
+    ///
+    /// Of the balls between the ends the one that the ray leaves last decides: where the side's quadric is
+    /// left at a ball between the ends, that is the place, and otherwise it is at one of the ends.
+    pub(super) fn exit(&self, from: &Point3<f64>, step: &Vector3<f64>) -> Option<f64> {
+        let from_start = from - self.start;
+        if self.length == 0.0 {
+            return leave(step.norm_squared(), from_start.dot(step), from_start.norm_squared(), self.radius);
+        }
+        let (along, ahead) = (from_start.dot(&self.axis), step.dot(&self.axis));
+        let tangent = 1.0 / (1.0 - self.slope * self.slope);
+        // The ball of which the ray is deepest inside stands at `deepest` plus `moved` a step.
+        let base = along + self.slope * self.radius;
+        let (deepest, moved) = (base * tangent, ahead * tangent);
+        let side = exit_of(
+            step.norm_squared() - ahead * moved,
+            from_start.dot(step) - base * moved,
+            from_start.norm_squared() - self.radius * self.radius - base * deepest,
+        );
+        if let Some(share) = side.filter(|share| (0.0..=self.length).contains(&(deepest + moved * share))) {
+            return Some(share);
+        }
+        [0.0, self.length]
+            .into_iter()
+            .filter_map(|s| {
+                let from_centre = from_start - self.axis * s;
+                let radius = self.radius + self.slope * s;
+                leave(step.norm_squared(), from_centre.dot(step), from_centre.norm_squared(), radius)
+            })
+            .reduce(f64::max)
+    }
+
     /// Where `p` is along the axis and away from it, and the ball that decides its distance, all in mm.
     fn nearest_ball(&self, p: &Point3<f64>) -> (f64, f64, f64) {
         let from_start = p - self.start;
@@ -65,6 +98,19 @@ impl Distance {
         let away = (from_start - self.axis * along).norm();
         (along, away, (along + self.lean * away).clamp(0.0, self.length))
     }
+}
+
+/// Where a ray leaves a ball, from the square of its step, the product of that with its start from the
+/// centre, and the square of the latter.
+fn leave(step: f64, product: f64, start: f64, radius: f64) -> Option<f64> {
+    exit_of(step, product, start - radius * radius)
+}
+
+/// The zero of a t^2 + 2 b t + c at which it grows.
+fn exit_of(a: f64, b: f64, c: f64) -> Option<f64> {
+    let root = (b * b - a * c).sqrt();
+    let zero = if b > 0.0 { -c / (b + root) } else { (root - b) / a };
+    zero.is_finite().then_some(zero)
 }
 
 #[cfg(test)]
