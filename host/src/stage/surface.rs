@@ -21,6 +21,7 @@ mod bundle;
 mod distance;
 mod lattice;
 mod patch;
+mod prune;
 
 use std::{
     collections::HashMap,

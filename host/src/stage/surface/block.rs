@@ -14,9 +14,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use nalgebra::Point3;
 
 use super::{
-    bundle::{Answers, Bundle, ROUNDING, SITES, prepare},
+    bundle::{Bundle, ROUNDING, SITES, prepare},
     distance::Distance,
     lattice::{LOWERED, Lattice, MAX_SHIFT, SIDE, point_of},
+    prune::{Around, Scratch, prune},
 };
 
 /// A block takes about 8 kB with its cones, and about 6 kB of mesh, so that this many take 1 GB.
@@ -31,9 +32,6 @@ const LEAF: i32 = 2;
 
 /// An edge that the surface cuts is up to a cube and two shifts long: so far off the surface its ends are.
 const EDGE: f32 = 1.5;
-
-/// Nearer than this to the middle of the ball that decides, rounding blurs how the distance grows; cubes.
-const BLUR: f32 = 0.5;
 
 /// A region of the lattice that is to be divided.
 #[derive(Clone, Copy, Debug)]
@@ -89,7 +87,7 @@ pub(super) struct Grove {
     fields: Vec<f32>,
     /// Of the regions on the way down, by level.
     levels: Vec<Level>,
-    answers: Answers,
+    scratch: Scratch,
     distances: Vec<f32>,
 }
 
@@ -104,13 +102,6 @@ pub(super) struct Level {
 pub(super) struct Solid<'a> {
     pub(super) lattice: &'a Lattice,
     pub(super) distances: &'a [Distance],
-}
-
-/// What the distance is in the middle of a region, in cubes, and the cone that decides it.
-#[derive(Clone, Copy)]
-struct Middle {
-    distance: f32,
-    nearest: u32,
 }
 
 /// How far the corners of a region of `cubes` a side are from its middle, in cubes.
@@ -142,42 +133,6 @@ fn bit_of(leaf: usize, cube: usize) -> usize {
     spread(leaf) << 1 | spread(cube)
 }
 
-/// Writes to `below` the cones of `bundle` that may be the nearest somewhere in a region of `cubes` a side,
-/// whose middle is `offset` cubes from the bundle's; nothing if the surface passes nowhere within `margin`.
-fn hand_down(
-    bundle: &Bundle,
-    offset: [f32; 3],
-    (cubes, margin): (i32, f32),
-    answers: &mut Answers,
-    below: &mut Vec<u32>,
-) -> Middle {
-    bundle.ask(offset, answers);
-    let Answers { distance, from_centre, growth: [gx, gy, gz] } = answers;
-    let mut best = 0;
-    for i in 0..bundle.cones.len() {
-        if distance[i] < distance[best] {
-            best = i;
-        }
-    }
-    let middle = Middle { distance: distance[best], nearest: bundle.cones[best] };
-    let reach = reach(cubes);
-    let rounding = ROUNDING * (from_centre[best] + reach);
-    if middle.distance.abs() > reach + margin + rounding {
-        return middle;
-    }
-    let bend = reach * reach / (2.0 * from_centre[best]);
-    for (i, &cone) in bundle.cones.iter().enumerate() {
-        let further = distance[i] - distance[best] - rounding - ROUNDING * from_centre[i];
-        let apart = [gx[i] - gx[best], gy[i] - gy[best], gz[i] - gz[best]];
-        let turned = (apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2]).sqrt();
-        let never = further > 2.0 * reach || (from_centre[i] > BLUR && further > turned * reach + bend);
-        if !never {
-            below.push(cone);
-        }
-    }
-    middle
-}
-
 impl Solid<'_> {
     fn middle(&self, region: Region) -> Point3<f64> {
         self.lattice.middle(region.corner, region.cubes)
@@ -201,11 +156,11 @@ impl Level {
     ) {
         self.prepare(solid, region);
         let bundle = Bundle::new(&self.cones, &self.fields, solid.middle(region));
-        let mut answers = Answers::default();
+        let mut scratch = Scratch::default();
         for octant in 0..8 {
             let start = cones.len();
             let octant = Octant::of(region, octant);
-            hand_down(&bundle, octant.offset, (octant.region.cubes, EDGE), &mut answers, cones);
+            prune(&bundle, octant.around, EDGE, &mut scratch, cones);
             if cones.len() > start {
                 child(octant.region, start..cones.len());
             }
@@ -216,8 +171,8 @@ impl Level {
 /// One of the eight children of a region.
 struct Octant {
     region: Region,
-    /// Of its middle from that of its parent, cubes.
-    offset: [f32; 3],
+    /// As seen from the middle of the parent.
+    around: Around,
 }
 
 impl Octant {
@@ -225,7 +180,7 @@ impl Octant {
         let region = parent.octant(octant);
         let quarter = parent.cubes as f32 / 4.0;
         let offset = [0, 1, 2].map(|axis| if octant >> (2 - axis) & 1 == 1 { quarter } else { -quarter });
-        Self { region, offset }
+        Self { region, around: Around { offset, reach: reach(region.cubes) } }
     }
 }
 
@@ -261,8 +216,7 @@ impl Grove {
         for octant in 0..8 {
             let octant = Octant::of(region, octant);
             below[0].cones.clear();
-            let extent = (octant.region.cubes, EDGE);
-            hand_down(&bundle, octant.offset, extent, &mut self.answers, &mut below[0].cones);
+            prune(&bundle, octant.around, EDGE, &mut self.scratch, &mut below[0].cones);
             if !below[0].cones.is_empty() {
                 self.descend(solid, octant.region, below, found);
             }
@@ -282,9 +236,9 @@ impl Grove {
         };
         let mut moved = [[Point3::origin(); 64]; 2];
         for octant in 0..8 {
-            let Octant { region, offset } = Octant::of(region, octant);
+            let Octant { region, around } = Octant::of(region, octant);
             let first_cone = self.cones.len();
-            let middle = hand_down(bundle, offset, (LEAF, 0.0), &mut self.answers, &mut self.cones);
+            let middle = prune(bundle, around, 0.0, &mut self.scratch, &mut self.cones);
             let leaf = Leaf {
                 first_cone: first_cone as u32,
                 cones: (self.cones.len() - first_cone) as u32,
@@ -340,23 +294,25 @@ impl Grove {
         self.moved[(block.first_moved + others + before.count_ones()) as usize]
     }
 
-    /// The signed distance of `p`, which is in the given leaf of `block`, and the cone that decides it; of a
-    /// leaf in which the surface does not pass, a bound of the distance.
-    pub(super) fn nearest(
+    /// Of the cones but one that contain `p`, which is in the given leaf of `block`, by more than `exact` mm,
+    /// the one that it is deepest in.
+    pub(super) fn deepest_but(
         &self,
+        known: u32,
         solid: &Solid,
         (block, octant): (&Block, usize),
-        p: &Point3<f64>,
+        (p, exact): (&Point3<f64>, f64),
         answers: &mut Vec<f32>,
-    ) -> (f64, u32) {
+    ) -> Option<u32> {
         let leaf = &block.leaves[octant];
         if leaf.cones == 0 {
-            return (solid.distances[leaf.nearest as usize].at(p), leaf.nearest);
+            let inside = known != leaf.nearest && solid.distances[leaf.nearest as usize].at(p) < -exact;
+            return inside.then_some(leaf.nearest);
         }
         let cones = &self.cones[leaf.first_cone as usize..][..leaf.cones as usize];
         let region = Region { corner: block.corner, cubes: SIDE }.octant(octant);
         let bundle = Bundle::new(cones, &self.fields[leaf.first_field..], solid.middle(region));
-        bundle.nearest(p, solid.lattice.cube, solid.distances, answers)
+        bundle.deepest_but(known, p, (solid.lattice.cube, exact), solid.distances, answers)
     }
 }
 

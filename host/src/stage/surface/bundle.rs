@@ -11,11 +11,10 @@ use super::distance::Distance;
 const FIELDS: usize = 13;
 
 /// Cones are kept in groups of so many.
-const GROUP: usize = 8;
+pub(super) const GROUP: usize = 4;
 
-/// What single precision may be wrong by, as a share of the lengths that it adds up; the worst are cones
-/// that taper steeply, near their axis.
-pub(super) const ROUNDING: f32 = 3e-5;
+/// What single precision may be wrong by, as a share of the lengths that it adds up.
+pub(super) const ROUNDING: f32 = 4e-6;
 
 /// Points of a leaf, see [`Bundle::nearest_of_sites`].
 pub(super) const SITES: usize = 16;
@@ -30,25 +29,6 @@ pub(super) struct Bundle<'a> {
     fields: &'a [f32],
     /// The middle of the region, mm.
     middle: Point3<f64>,
-}
-
-/// Answers of [`Bundle::ask`], a number a cone in each list.
-#[derive(Debug, Default)]
-pub(super) struct Answers {
-    /// Signed distances, cubes.
-    pub(super) distance: Vec<f32>,
-    /// From the centre of the ball that decides, cubes.
-    pub(super) from_centre: Vec<f32>,
-    /// How the distance grows, per cube: a unit vector.
-    pub(super) growth: [Vec<f32>; 3],
-}
-
-impl Answers {
-    fn resize(&mut self, count: usize) {
-        for list in [&mut self.distance, &mut self.from_centre].into_iter().chain(&mut self.growth) {
-            list.resize(count, 0.0);
-        }
-    }
 }
 
 /// Appends what [`Bundle`] keeps of `cones` to `fields`.
@@ -88,11 +68,11 @@ pub(super) fn prepare(cones: &[u32], all: &[Distance], middle: &Point3<f64>, cub
     fields[10 * stride + cones.len()..11 * stride].fill(f32::NEG_INFINITY);
 }
 
-fn least(a: f32, b: f32) -> f32 {
+pub(super) fn least(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-fn most(a: f32, b: f32) -> f32 {
+pub(super) fn most(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
@@ -103,31 +83,15 @@ impl<'a> Bundle<'a> {
         Self { cones, fields: &fields[..count], middle }
     }
 
-    fn fields(&self) -> [&'a [f32]; FIELDS] {
+    #[inline]
+    pub(super) fn fields(&self) -> [&'a [f32]; FIELDS] {
         let stride = self.cones.len().next_multiple_of(GROUP);
-        std::array::from_fn(|field| &self.fields[field * stride..][..stride])
-    }
-
-    /// Signed distances of the point that is `offset` cubes from the middle, and how they grow.
-    pub(super) fn ask(&self, offset: [f32; 3], answers: &mut Answers) {
-        let [vx, vy, vz, _, _, ux, uy, uz, low, high, radius, slope, lean] = self.fields();
-        let count = vx.len();
-        answers.resize(count);
-        let [gx, gy, gz] = &mut answers.growth;
-        let (gx, gy, gz) = (&mut gx[..count], &mut gy[..count], &mut gz[..count]);
-        let (distance, from_centre) = (&mut answers.distance[..count], &mut answers.from_centre[..count]);
-        for i in 0..count {
-            let (x, y, z) = (vx[i] + offset[0], vy[i] + offset[1], vz[i] + offset[2]);
-            let along = x * ux[i] + y * uy[i] + z * uz[i];
-            let away = most(x * x + y * y + z * z - along * along, 0.0).sqrt();
-            let s = most(least(along + lean[i] * away, high[i]), low[i]);
-            let (x, y, z) = (x - s * ux[i], y - s * uy[i], z - s * uz[i]);
-            let far = (x * x + y * y + z * z).sqrt();
-            distance[i] = far - (radius[i] + slope[i] * s);
-            from_centre[i] = far;
-            let scale = 1.0 / most(far, f32::MIN_POSITIVE);
-            (gx[i], gy[i], gz[i]) = (x * scale, y * scale, z * scale);
-        }
+        let mut rest = self.fields;
+        [(); FIELDS].map(|()| {
+            let (field, others) = rest.split_at(stride);
+            rest = others;
+            field
+        })
     }
 
     /// Signed distances, cubes, of points that are `offsets` cubes (x, y, z, and their square) from the
@@ -161,6 +125,39 @@ impl<'a> Bundle<'a> {
         (nearest, place)
     }
 
+    /// Fills `answers` with the signed distances of `p`, in cubes of `cube` mm, and returns the least.
+    fn ask(&self, p: &Point3<f64>, cube: f64, answers: &mut Vec<f32>) -> f32 {
+        let [vx, vy, vz, _, _, ux, uy, uz, low, high, radius, slope, lean] = self.fields();
+        let scale = 1.0 / cube;
+        let [ox, oy, oz] = [0, 1, 2].map(|axis| ((p[axis] - self.middle[axis]) * scale) as f32);
+        let count = vx.len();
+        answers.resize(count, 0.0);
+        let mut nearest = [f32::INFINITY; GROUP];
+        for first in (0..count).step_by(GROUP) {
+            let group = first..first + GROUP;
+            let [vx, vy, vz] = [vx, vy, vz].map(|field| &field[group.clone()]);
+            let [ux, uy, uz] = [ux, uy, uz].map(|field| &field[group.clone()]);
+            let [low, high] = [low, high].map(|field| &field[group.clone()]);
+            let [radius, slope, lean] = [radius, slope, lean].map(|field| &field[group.clone()]);
+            let answers = &mut answers[group];
+            for i in 0..GROUP {
+                let (x, y, z) = (vx[i] + ox, vy[i] + oy, vz[i] + oz);
+                let along = x * ux[i] + y * uy[i] + z * uz[i];
+                let away = most(x * x + y * y + z * z - along * along, 0.0);
+                let s = most(least(along + lean[i] * away.sqrt(), high[i]), low[i]);
+                answers[i] = ((along - s) * (along - s) + away).sqrt() - (radius[i] + slope[i] * s);
+                nearest[i] = least(answers[i], nearest[i]);
+            }
+        }
+        nearest.into_iter().fold(f32::INFINITY, least)
+    }
+
+    /// How far a distance in the bundle may be off, cubes.
+    fn blur(&self) -> f32 {
+        let [.., radius, _, _] = self.fields();
+        2.0 * ROUNDING * (radius[0].abs() + 4.0)
+    }
+
     /// Signed distance of `p` to the union, mm, and the cone that decides it: of equals, the first in the
     /// list of all. `cube` is in mm.
     pub(super) fn nearest(
@@ -170,25 +167,7 @@ impl<'a> Bundle<'a> {
         all: &[Distance],
         answers: &mut Vec<f32>,
     ) -> (f64, u32) {
-        let [vx, vy, vz, _, _, ux, uy, uz, low, high, radius, slope, lean] = self.fields();
-        let offset: Vector3<f32> = ((p - self.middle) / cube).map(|x| x as f32);
-        let count = vx.len();
-        answers.resize(count, 0.0);
-        let answers = &mut answers[..count];
-        for i in 0..count {
-            let (x, y, z) = (vx[i] + offset.x, vy[i] + offset.y, vz[i] + offset.z);
-            let along = x * ux[i] + y * uy[i] + z * uz[i];
-            let away = most(x * x + y * y + z * z - along * along, 0.0);
-            let s = most(least(along + lean[i] * away.sqrt(), high[i]), low[i]);
-            answers[i] = ((along - s) * (along - s) + away).sqrt() - (radius[i] + slope[i] * s);
-        }
-        let mut closest = 0;
-        for i in 0..count {
-            if answers[i] < answers[closest] {
-                closest = i;
-            }
-        }
-        let bound = answers[closest] + ROUNDING * 2.0 * (answers[closest].abs() + radius[closest].abs() + 4.0);
+        let bound = self.ask(p, cube, answers) + 2.0 * self.blur();
         let mut best = (f64::INFINITY, u32::MAX);
         for (&cone, &answer) in self.cones.iter().zip(&*answers) {
             if answer <= bound {
@@ -199,5 +178,28 @@ impl<'a> Bundle<'a> {
             }
         }
         best
+    }
+
+    /// Of the cones but one that contain `p` by more than `exact` mm, the one that it is deepest in.
+    pub(super) fn deepest_but(
+        &self,
+        known: u32,
+        p: &Point3<f64>,
+        (cube, exact): (f64, f64),
+        all: &[Distance],
+        answers: &mut Vec<f32>,
+    ) -> Option<u32> {
+        let blur = self.blur();
+        let bound = least(self.ask(p, cube, answers) + 2.0 * blur, blur);
+        let mut best = (-exact, None);
+        for (&cone, &answer) in self.cones.iter().zip(&*answers) {
+            if answer <= bound && cone != known {
+                let distance = all[cone as usize].at(p);
+                if distance < best.0 {
+                    best = (distance, Some(cone));
+                }
+            }
+        }
+        best.1
     }
 }

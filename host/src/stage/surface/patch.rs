@@ -177,11 +177,9 @@ fn crossing(
         let p = from + step * share;
         let (ahead, leaf) = blocks[0].expect("a block").1.leaf_of(solid.lattice, &p);
         let Some((grove, block)) = blocks.get(ahead).copied().flatten() else { break };
-        let (distance, nearest) = grove.nearest(solid, (block, leaf), &p, answers);
-        if nearest == cone || distance > -EXACT * solid.lattice.cube {
-            break;
-        }
-        cone = nearest;
+        let exact = EXACT * solid.lattice.cube;
+        let Some(deeper) = grove.deepest_but(cone, solid, (block, leaf), (&p, exact), answers) else { break };
+        cone = deeper;
     }
     from + step * share.clamp(END, 1.0 - END)
 }
