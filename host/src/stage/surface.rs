@@ -19,6 +19,7 @@
 mod block;
 mod bundle;
 mod distance;
+mod lanes;
 mod lattice;
 mod patch;
 mod prune;
@@ -216,10 +217,10 @@ impl Mesher {
         let cuts = &*cuts;
         mesh.vertices.resize(vertices as usize, Point3::origin());
         spread(0, cuts, &mut mesh.vertices, &|cut| cut.vertices as usize, &|grove, vertices| {
-            let (mut answers, mut vertices) = (Vec::new(), vertices);
+            let mut vertices = vertices;
             for (place, cut) in cuts[grove].iter().enumerate() {
                 let (own, others) = vertices.split_at_mut(cut.vertices as usize);
-                cut.put_vertices(&solid, &blocks_of(&ahead_of(grove, place)), own, &mut answers);
+                cut.put_vertices(&solid, &blocks_of(&ahead_of(grove, place)), own);
                 vertices = others;
             }
         });

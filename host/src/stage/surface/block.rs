@@ -14,10 +14,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use nalgebra::Point3;
 
 use super::{
-    bundle::{Bundle, ROUNDING, SITES, prepare},
+    bundle::{Bundle, Group, ROUNDING, SITES, prepare},
     distance::Distance,
+    lanes::LANES,
     lattice::{LOWERED, Lattice, MAX_SHIFT, SIDE, point_of},
-    prune::{Around, Scratch, prune},
+    prune::{Answer, Around, prune},
 };
 
 /// A block takes about 8 kB with its cones, and about 6 kB of mesh, so that this many take 1 GB.
@@ -72,8 +73,8 @@ struct Leaf {
     /// Its cones in [`Grove::cones`]; none where the surface does not pass.
     first_cone: u32,
     cones: u32,
-    /// In [`Grove::fields`].
-    first_field: usize,
+    /// In [`Grove::groups`].
+    first_group: u32,
     /// The cone nearest to its middle.
     nearest: u32,
 }
@@ -84,17 +85,16 @@ pub(super) struct Grove {
     pub(super) blocks: Vec<Block>,
     moved: Vec<Point3<f64>>,
     cones: Vec<u32>,
-    fields: Vec<f32>,
+    groups: Vec<Group>,
     /// Of the regions on the way down, by level.
     levels: Vec<Level>,
-    scratch: Scratch,
-    distances: Vec<f32>,
+    answers: Vec<Answer>,
 }
 
 #[derive(Debug, Default)]
 pub(super) struct Level {
     pub(super) cones: Vec<u32>,
-    fields: Vec<f32>,
+    groups: Vec<Group>,
 }
 
 /// What all regions have in common.
@@ -109,17 +109,15 @@ fn reach(cubes: i32) -> f32 {
     cubes as f32 * 0.866_025_5
 }
 
-/// Offsets of the points of a leaf from its middle, and their squares, in cubes: corners of cubes first.
-const OFFSETS: [[f32; SITES]; 4] = {
-    let mut offsets = [[0.0; SITES]; 4];
+/// Offsets of the points of a leaf from its middle, in cubes: corners of cubes first.
+const OFFSETS: [[[f32; LANES]; 3]; SITES / LANES] = {
+    let mut offsets = [[[0.0; LANES]; 3]; SITES / LANES];
     let mut i = 0;
     while i < SITES {
         let lowest = if i < 8 { -0.75 } else { -0.25 };
         let mut axis = 0;
         while axis < 3 {
-            let x = lowest + (i >> (2 - axis) & 1) as f32;
-            offsets[axis][i] = x;
-            offsets[3][i] += x * x;
+            offsets[i / LANES][axis][i % LANES] = lowest + (i >> (2 - axis) & 1) as f32;
             axis += 1;
         }
         i += 1;
@@ -142,8 +140,8 @@ impl Solid<'_> {
 impl Level {
     /// Makes this the level of `region`, of which it has the cones already.
     fn prepare(&mut self, solid: &Solid, region: Region) {
-        self.fields.clear();
-        prepare(&self.cones, solid.distances, &solid.middle(region), solid.lattice.cube, &mut self.fields);
+        self.groups.clear();
+        prepare(&self.cones, solid.distances, &solid.middle(region), solid.lattice.cube, &mut self.groups);
     }
 
     /// Puts the cones of the children of `region`, where the surface can pass near, one list after another.
@@ -155,12 +153,12 @@ impl Level {
         mut child: impl FnMut(Region, std::ops::Range<usize>),
     ) {
         self.prepare(solid, region);
-        let bundle = Bundle::new(&self.cones, &self.fields, solid.middle(region));
-        let mut scratch = Scratch::default();
+        let bundle = Bundle { cones: &self.cones, groups: &self.groups, middle: solid.middle(region) };
+        let mut answers = Vec::new();
         for octant in 0..8 {
             let start = cones.len();
             let octant = Octant::of(region, octant);
-            prune(&bundle, octant.around, EDGE, &mut scratch, cones);
+            prune(&bundle, octant.around, EDGE, &mut answers, cones);
             if cones.len() > start {
                 child(octant.region, start..cones.len());
             }
@@ -191,7 +189,7 @@ impl Grove {
         self.blocks.clear();
         self.moved.clear();
         self.cones.clear();
-        self.fields.clear();
+        self.groups.clear();
         let mut levels = std::mem::take(&mut self.levels);
         let depth = (region.cubes / SIDE).trailing_zeros() as usize + 1;
         if levels.len() < depth {
@@ -206,7 +204,7 @@ impl Grove {
     fn descend(&mut self, solid: &Solid, region: Region, levels: &mut [Level], found: &AtomicUsize) {
         let (level, below) = levels.split_first_mut().expect("a level for each division");
         level.prepare(solid, region);
-        let bundle = Bundle::new(&level.cones, &level.fields, solid.middle(region));
+        let bundle = Bundle { cones: &level.cones, groups: &level.groups, middle: solid.middle(region) };
         if region.cubes == SIDE {
             if found.fetch_add(1, Ordering::Relaxed) < MAX_BLOCKS {
                 self.plant(solid, region, &bundle);
@@ -216,7 +214,7 @@ impl Grove {
         for octant in 0..8 {
             let octant = Octant::of(region, octant);
             below[0].cones.clear();
-            prune(&bundle, octant.around, EDGE, &mut self.scratch, &mut below[0].cones);
+            prune(&bundle, octant.around, EDGE, &mut self.answers, &mut below[0].cones);
             if !below[0].cones.is_empty() {
                 self.descend(solid, octant.region, below, found);
             }
@@ -225,7 +223,7 @@ impl Grove {
 
     /// Adds the block that is `region`.
     fn plant(&mut self, solid: &Solid, region: Region, bundle: &Bundle) {
-        let leaf = Leaf { first_cone: 0, cones: 0, first_field: 0, nearest: 0 };
+        let leaf = Leaf { first_cone: 0, cones: 0, first_group: 0, nearest: 0 };
         let mut block = Block {
             corner: region.corner,
             inside: [0; 2],
@@ -238,11 +236,11 @@ impl Grove {
         for octant in 0..8 {
             let Octant { region, around } = Octant::of(region, octant);
             let first_cone = self.cones.len();
-            let middle = prune(bundle, around, 0.0, &mut self.scratch, &mut self.cones);
+            let middle = prune(bundle, around, 0.0, &mut self.answers, &mut self.cones);
             let leaf = Leaf {
                 first_cone: first_cone as u32,
                 cones: (self.cones.len() - first_cone) as u32,
-                first_field: self.fields.len(),
+                first_group: self.groups.len() as u32,
                 nearest: middle.nearest,
             };
             block.leaves[octant] = leaf;
@@ -256,12 +254,12 @@ impl Grove {
             }
             let centre = solid.middle(region);
             let cones = &self.cones[first_cone..];
-            prepare(cones, solid.distances, &centre, solid.lattice.cube, &mut self.fields);
-            let bundle = Bundle::new(cones, &self.fields[leaf.first_field..], centre);
+            prepare(cones, solid.distances, &centre, solid.lattice.cube, &mut self.groups);
+            let bundle = Bundle { cones, groups: &self.groups[leaf.first_group as usize..], middle: centre };
             let (distances, places) = bundle.nearest_of_sites(&OFFSETS);
             for i in 0..SITES {
                 let (kind, bit) = (i >> 3, bit_of(octant, i & 7));
-                let cone = cones[places[i] as usize];
+                let cone = cones[places[i]];
                 let blur = 4.0 * ROUNDING * (distances[i].abs() + 4.0 + (solid.distances[cone as usize].radius / solid.lattice.cube) as f32);
                 if distances[i].abs() > CLEAR as f32 + blur {
                     block.inside[kind] |= u64::from(distances[i] < 0.0) << bit;
@@ -269,7 +267,7 @@ impl Grove {
                     continue;
                 }
                 let unmoved = solid.lattice.position(point_of(region.corner, bit_of(0, i & 7), kind));
-                let site = bundle.site(unmoved, solid, &mut self.distances);
+                let site = bundle.site(unmoved, solid);
                 block.inside[kind] |= u64::from(site.distance < 0.0) << bit;
                 block.cones[64 * kind + bit] = site.cone;
                 if site.position != unmoved {
@@ -302,7 +300,6 @@ impl Grove {
         solid: &Solid,
         (block, octant): (&Block, usize),
         (p, exact): (&Point3<f64>, f64),
-        answers: &mut Vec<f32>,
     ) -> Option<u32> {
         let leaf = &block.leaves[octant];
         if leaf.cones == 0 {
@@ -311,8 +308,9 @@ impl Grove {
         }
         let cones = &self.cones[leaf.first_cone as usize..][..leaf.cones as usize];
         let region = Region { corner: block.corner, cubes: SIDE }.octant(octant);
-        let bundle = Bundle::new(cones, &self.fields[leaf.first_field..], solid.middle(region));
-        bundle.deepest_but(known, p, (solid.lattice.cube, exact), solid.distances, answers)
+        let groups = &self.groups[leaf.first_group as usize..][..cones.len().div_ceil(LANES)];
+        let bundle = Bundle { cones, groups, middle: solid.middle(region) };
+        bundle.deepest_but(known, p, (solid.lattice.cube, exact), solid.distances)
     }
 }
 
@@ -352,10 +350,10 @@ struct Site {
 
 impl Bundle<'_> {
     /// The lattice point at `position`, moved until it is [`CLEAR`] of the surface.
-    fn site(&self, position: Point3<f64>, solid: &Solid, answers: &mut Vec<f32>) -> Site {
+    fn site(&self, position: Point3<f64>, solid: &Solid) -> Site {
         let cube = solid.lattice.cube;
         let clear = CLEAR * cube;
-        let (distance, cone) = self.nearest(&position, cube, solid.distances, answers);
+        let (distance, cone) = self.nearest(&position, cube, solid.distances);
         let unmoved = Site { position, distance, cone };
         if distance.abs() >= clear {
             return unmoved;
@@ -366,7 +364,7 @@ impl Bundle<'_> {
         // Away from the surface; but from a crease outward there is no getting away, only inward.
         for target in [clear.copysign(distance), -clear] {
             let position = position + outward * (target - distance);
-            let (distance, cone) = self.nearest(&position, cube, solid.distances, answers);
+            let (distance, cone) = self.nearest(&position, cube, solid.distances);
             if distance.abs() > 0.99 * clear {
                 return Site { position, distance, cone };
             }

@@ -99,7 +99,6 @@ impl Cut {
         solid: &Solid,
         blocks: &Blocks,
         vertices: &mut [Point3<f64>],
-        answers: &mut Vec<f32>,
     ) {
         let mut vertices = vertices.iter_mut();
         for (direction, &edges) in self.edges.iter().enumerate() {
@@ -113,7 +112,7 @@ impl Cut {
                 let [start, end] = [from, to].map(|(_, grove, block, kind, bit)| grove.position(solid, block, kind, bit));
                 let cone = from.2.cone(from.3, from.4);
                 *vertices.next().expect("a place for each vertex") =
-                    crossing(solid, blocks, [start, end], cone, answers);
+                    crossing(solid, blocks, [start, end], cone);
             }
         }
     }
@@ -167,7 +166,6 @@ fn crossing(
     blocks: &Blocks,
     [from, to]: [Point3<f64>; 2],
     mut cone: u32,
-    answers: &mut Vec<f32>,
 ) -> Point3<f64> {
     let step = to - from;
     let mut share = 0.0;
@@ -178,7 +176,7 @@ fn crossing(
         let (ahead, leaf) = blocks[0].expect("a block").1.leaf_of(solid.lattice, &p);
         let Some((grove, block)) = blocks.get(ahead).copied().flatten() else { break };
         let exact = EXACT * solid.lattice.cube;
-        let Some(deeper) = grove.deepest_but(cone, solid, (block, leaf), (&p, exact), answers) else { break };
+        let Some(deeper) = grove.deepest_but(cone, solid, (block, leaf), (&p, exact)) else { break };
         cone = deeper;
     }
     from + step * share.clamp(END, 1.0 - END)
