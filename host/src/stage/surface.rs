@@ -6,11 +6,13 @@
 //! area, and no two faces cross.
 //!
 //! The union is an implicit function, the least of the exact signed distances to the cones
-//! (`distance.rs`, `nearby.rs`). It is looked at only where the surface can pass (`block.rs`), on a
-//! body-centred cubic lattice whose tetrahedra are cut where the function changes its sign
-//! (`tetrahedra.rs`), and the pieces are joined (`stitch.rs`). Tetrahedra, because a plane cuts one in a
-//! triangle or a quadrilateral and nothing else: there is no ambiguous case, so the promise holds by
-//! construction instead of by repair (`docs/decisions/0003-isosurface.md`).
+//! (`distance.rs`). It is looked at only where the surface can pass (`region.rs`, `block.rs`), there with
+//! the cones that can be the nearest (`prune.rs`, `bundle.rs`), on a body-centred cubic lattice
+//! (`lattice.rs`) whose tetrahedra are cut where the function changes its sign (`patch.rs`). Each point, edge
+//! and tetrahedron belongs to one block and is worked out once (`mesher.rs`). Tetrahedra, because a plane
+//! cuts one in a triangle or a quadrilateral and nothing else: there is no ambiguous case, so the promise
+//! holds by construction instead of by repair (`docs/decisions/0003-isosurface.md`,
+//! `docs/decisions/0014-fast-isosurface.md`).
 //!
 //! Cost: proportional to surface / cell². The result has the same bits for any number of threads.
 //! Not promised: features thinner than the cell may be missing, and concave creases are rounded by up to
@@ -21,25 +23,16 @@ mod bundle;
 mod distance;
 mod lanes;
 mod lattice;
+mod mesher;
 mod patch;
 mod prune;
-
-use std::{
-    collections::HashMap,
-    hash::{BuildHasherDefault, Hasher},
-    ops::Range,
-    sync::atomic::AtomicUsize,
-};
+mod region;
 
 use nalgebra::Point3;
-use rayon::prelude::*;
 use thiserror::Error;
 
 use crate::mesh::Mesh;
-use block::{Grove, Level, MAX_BLOCKS, Region, Solid};
-use distance::Distance;
-use lattice::{Lattice, SIDE};
-use patch::{Blocks, Cut};
+pub use mesher::Mesher;
 
 /// The convex hull of two balls: the piece of the solid between neighbouring samples of the curve
 /// skeleton. With equal ends it is one ball.
@@ -102,183 +95,6 @@ pub fn surface(cones: &[RoundCone], cell: f64) -> Result<Mesh, SurfaceError> {
     let mut mesh = Mesh::default();
     Mesher::default().surface(cones, cell, &mut mesh)?;
     Ok(mesh)
-}
-
-/// What [`surface`] needs on the way, kept from one solid to the next: once it has grown to their size,
-/// nothing more is allocated.
-#[derive(Debug, Default)]
-pub struct Mesher {
-    distances: Vec<Distance>,
-    seeds: [Seeds; 2],
-    level: Level,
-    groves: Vec<Grove>,
-    cuts: Vec<Vec<Cut>>,
-    /// The grove of a block and its place there, by its corner.
-    places: HashMap<[i32; 3], (u32, u32), Mixed>,
-}
-
-/// Regions with their cones.
-#[derive(Debug, Default)]
-struct Seeds {
-    regions: Vec<(Region, Range<usize>)>,
-    cones: Vec<u32>,
-}
-
-/// The solid is divided until there are so many regions, which are then worked on side by side.
-const GROVES: usize = 64;
-
-impl Mesher {
-    /// As [`surface`], into `mesh`, which is emptied first.
-    ///
-    /// # Errors
-    ///
-    /// See [`SurfaceError`].
-    pub fn surface(&mut self, cones: &[RoundCone], cell: f64, mesh: &mut Mesh) -> Result<(), SurfaceError> {
-        mesh.vertices.clear();
-        mesh.faces.clear();
-        check(cones, cell)?;
-        self.distances.clear();
-        self.distances.extend(cones.iter().map(Distance::to));
-        let lattice = Lattice::around(cones, cell * CUBE);
-        let solid = Solid { lattice: &lattice, distances: &self.distances };
-        let too_fine = SurfaceError::TooFine { cell, size: lattice.size };
-        let along = lattice.blocks_along().ok_or(too_fine)?;
-
-        let [seeds, next] = &mut self.seeds;
-        seeds.cones.clear();
-        seeds.cones.extend(0..u32::try_from(cones.len()).map_err(|_| too_fine)?);
-        seeds.regions.clear();
-        seeds.regions.push((Region { corner: [0; 3], cubes: along * SIDE }, 0..cones.len()));
-        while seeds.regions.len() < GROVES && seeds.regions.first().is_some_and(|(region, _)| region.cubes > SIDE) {
-            next.cones.clear();
-            next.regions.clear();
-            for (region, own) in &seeds.regions {
-                self.level.cones.clear();
-                self.level.cones.extend(&seeds.cones[own.clone()]);
-                self.level.divide(&solid, *region, &mut next.cones, |region, own| {
-                    next.regions.push((region, own));
-                });
-            }
-            std::mem::swap(seeds, next);
-        }
-
-        let count = seeds.regions.len();
-        if self.groves.len() < count {
-            self.groves.resize_with(count, Grove::default);
-            self.cuts.resize_with(count, Vec::new);
-        }
-        let (groves, cuts) = (&mut self.groves[..count], &mut self.cuts[..count]);
-        let found = AtomicUsize::new(0);
-        groves.par_iter_mut().zip(&seeds.regions).for_each(|(grove, (region, own))| {
-            grove.grow(&solid, *region, &seeds.cones[own.clone()], &found);
-        });
-        if found.into_inner() > MAX_BLOCKS {
-            return Err(too_fine);
-        }
-
-        let groves = &*groves;
-        self.places.clear();
-        for (number, grove) in groves.iter().enumerate() {
-            let places = grove.blocks.iter().enumerate();
-            self.places.extend(places.map(|(place, block)| (block.corner, (number as u32, place as u32))));
-        }
-        let places = &self.places;
-        let ahead_of = |grove: usize, place: usize| -> [Option<(u32, u32)>; 8] {
-            let corner = groves[grove].blocks[place].corner;
-            std::array::from_fn(|ahead| {
-                if ahead == 0 {
-                    return Some((grove as u32, place as u32));
-                }
-                let bit = |axis: usize| (ahead >> (2 - axis) & 1) as i32 * 2 * SIDE;
-                places.get(&[0, 1, 2].map(|axis| corner[axis] + bit(axis))).copied()
-            })
-        };
-        let blocks_of = |places: &[Option<(u32, u32)>; 8]| -> Blocks<'_> {
-            places.map(|place| {
-                place.map(|(grove, place)| {
-                    let grove = &groves[grove as usize];
-                    (grove, &grove.blocks[place as usize])
-                })
-            })
-        };
-        cuts.par_iter_mut().enumerate().for_each(|(grove, cuts)| {
-            cuts.clear();
-            cuts.extend((0..groves[grove].blocks.len()).map(|place| Cut::of(&blocks_of(&ahead_of(grove, place)))));
-        });
-        let (mut vertices, mut faces) = (0, 0);
-        for cut in cuts.iter_mut().flatten() {
-            cut.first_vertex = vertices;
-            vertices += cut.vertices;
-            faces += cut.faces;
-        }
-        if faces == 0 {
-            return Err(SurfaceError::TooCoarse { cell });
-        }
-        let cuts = &*cuts;
-        mesh.vertices.resize(vertices as usize, Point3::origin());
-        spread(0, cuts, &mut mesh.vertices, &|cut| cut.vertices as usize, &|grove, vertices| {
-            let mut vertices = vertices;
-            for (place, cut) in cuts[grove].iter().enumerate() {
-                let (own, others) = vertices.split_at_mut(cut.vertices as usize);
-                cut.put_vertices(&solid, &blocks_of(&ahead_of(grove, place)), own);
-                vertices = others;
-            }
-        });
-        mesh.faces.resize(faces as usize, [0; 3]);
-        let vertices = &mesh.vertices;
-        spread(0, cuts, &mut mesh.faces, &|cut| cut.faces as usize, &|grove, faces| {
-            let mut faces = faces;
-            for (place, cut) in cuts[grove].iter().enumerate() {
-                let (own, others) = faces.split_at_mut(cut.faces as usize);
-                let places = ahead_of(grove, place);
-                let cuts = places.map(|place| place.map(|(grove, place)| &cuts[grove as usize][place as usize]));
-                Cut::put_faces(&blocks_of(&places), &cuts, vertices, own);
-                faces = others;
-            }
-        });
-        Ok(())
-    }
-}
-
-/// Hands to `put`, side by side, the number of each grove and its share of `out`.
-fn spread<T: Send>(
-    first: usize,
-    cuts: &[Vec<Cut>],
-    out: &mut [T],
-    count: &(impl Fn(&Cut) -> usize + Sync),
-    put: &(impl Fn(usize, &mut [T]) + Sync),
-) {
-    if let [_] = cuts {
-        return put(first, out);
-    }
-    let (left, right) = cuts.split_at(cuts.len() / 2);
-    let (here, there) = out.split_at_mut(left.iter().flatten().map(count).sum());
-    rayon::join(
-        || spread(first, left, here, count, put),
-        || spread(first + left.len(), right, there, count, put),
-    );
-}
-
-/// Mixes the bits of a block's corner.
-#[derive(Debug, Default)]
-struct Mixer(u64);
-
-type Mixed = BuildHasherDefault<Mixer>;
-
-impl Hasher for Mixer {
-    fn write(&mut self, bytes: &[u8]) {
-        for &byte in bytes {
-            self.write_i32(i32::from(byte));
-        }
-    }
-
-    fn write_i32(&mut self, x: i32) {
-        self.0 = (self.0.rotate_left(26) ^ u64::from(x.cast_unsigned())).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    }
-
-    fn finish(&self) -> u64 {
-        self.0.rotate_left(26)
-    }
 }
 
 fn check(cones: &[RoundCone], cell: f64) -> Result<(), SurfaceError> {

@@ -3,7 +3,7 @@
 //! A signed distance changes by at most the way walked. So when its size in the middle of a region exceeds
 //! the region's reach there is no surface in it. From one cube around the solid this rule is applied to its
 //! eight children, and so on down to leaves of two cubes a side, each with the cones that can be the
-//! nearest in it (`Grower::hand_down`): the cost follows the surface, not the volume.
+//! nearest in it (`prune.rs`): the cost follows the surface, not the volume.
 //!
 //! Points that are too near the surface are moved off it, by less than would turn a tetrahedron inside out,
 //! so that no cut passes close to a corner and no face degenerates; isosurface stuffing (Labelle and
@@ -15,10 +15,10 @@ use nalgebra::Point3;
 
 use super::{
     bundle::{Bundle, Group, ROUNDING, SITES, prepare},
-    distance::Distance,
     lanes::LANES,
     lattice::{LOWERED, Lattice, MAX_SHIFT, SIDE, point_of},
-    prune::{Answer, Around, prune},
+    prune::{Answer, prune},
+    region::{Level, Octant, Region, Solid},
 };
 
 /// A block takes about 8 kB with its cones, and about 6 kB of mesh, so that this many take 1 GB.
@@ -32,24 +32,7 @@ const CLEAR: f64 = MAX_SHIFT / 2.0;
 const LEAF: i32 = 2;
 
 /// An edge that the surface cuts is up to a cube and two shifts long: so far off the surface its ends are.
-const EDGE: f32 = 1.5;
-
-/// A region of the lattice that is to be divided.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Region {
-    /// Its lowest corner, in half cubes.
-    pub(super) corner: [i32; 3],
-    /// Lattice cubes along its side.
-    pub(super) cubes: i32,
-}
-
-impl Region {
-    fn octant(&self, octant: usize) -> Self {
-        let half = self.cubes / 2;
-        let bit = |axis: usize| (octant >> (2 - axis) & 1) as i32;
-        Self { corner: [0, 1, 2].map(|axis| self.corner[axis] + bit(axis) * half * 2), cubes: half }
-    }
-}
+pub(super) const EDGE: f32 = 1.5;
 
 /// A block: [`SIDE`]^3 cubes of the lattice near the surface.
 #[derive(Debug)]
@@ -91,24 +74,6 @@ pub(super) struct Grove {
     answers: Vec<Answer>,
 }
 
-#[derive(Debug, Default)]
-pub(super) struct Level {
-    pub(super) cones: Vec<u32>,
-    groups: Vec<Group>,
-}
-
-/// What all regions have in common.
-#[derive(Clone, Copy)]
-pub(super) struct Solid<'a> {
-    pub(super) lattice: &'a Lattice,
-    pub(super) distances: &'a [Distance],
-}
-
-/// How far the corners of a region of `cubes` a side are from its middle, in cubes.
-fn reach(cubes: i32) -> f32 {
-    cubes as f32 * 0.866_025_5
-}
-
 /// Offsets of the points of a leaf from its middle, in cubes: corners of cubes first.
 const OFFSETS: [[[f32; LANES]; 3]; SITES / LANES] = {
     let mut offsets = [[[0.0; LANES]; 3]; SITES / LANES];
@@ -131,57 +96,6 @@ fn bit_of(leaf: usize, cube: usize) -> usize {
     spread(leaf) << 1 | spread(cube)
 }
 
-impl Solid<'_> {
-    fn middle(&self, region: Region) -> Point3<f64> {
-        self.lattice.middle(region.corner, region.cubes)
-    }
-}
-
-impl Level {
-    /// Makes this the level of `region`, of which it has the cones already.
-    fn prepare(&mut self, solid: &Solid, region: Region) {
-        self.groups.clear();
-        prepare(&self.cones, solid.distances, &solid.middle(region), solid.lattice.cube, &mut self.groups);
-    }
-
-    /// Puts the cones of the children of `region`, where the surface can pass near, one list after another.
-    pub(super) fn divide(
-        &mut self,
-        solid: &Solid,
-        region: Region,
-        cones: &mut Vec<u32>,
-        mut child: impl FnMut(Region, std::ops::Range<usize>),
-    ) {
-        self.prepare(solid, region);
-        let bundle = Bundle { cones: &self.cones, groups: &self.groups, middle: solid.middle(region) };
-        let mut answers = Vec::new();
-        for octant in 0..8 {
-            let start = cones.len();
-            let octant = Octant::of(region, octant);
-            prune(&bundle, octant.around, EDGE, &mut answers, cones);
-            if cones.len() > start {
-                child(octant.region, start..cones.len());
-            }
-        }
-    }
-}
-
-/// One of the eight children of a region.
-struct Octant {
-    region: Region,
-    /// As seen from the middle of the parent.
-    around: Around,
-}
-
-impl Octant {
-    fn of(parent: Region, octant: usize) -> Self {
-        let region = parent.octant(octant);
-        let quarter = parent.cubes as f32 / 4.0;
-        let offset = [0, 1, 2].map(|axis| if octant >> (2 - axis) & 1 == 1 { quarter } else { -quarter });
-        Self { region, around: Around { offset, reach: reach(region.cubes) } }
-    }
-}
-
 impl Grove {
     /// Finds the blocks of `region`, of which `cones` may be the nearest ones. `found` counts the blocks of
     /// all groves, which stop when there are too many.
@@ -202,17 +116,18 @@ impl Grove {
     }
 
     fn descend(&mut self, solid: &Solid, region: Region, levels: &mut [Level], found: &AtomicUsize) {
+        if found.load(Ordering::Relaxed) > MAX_BLOCKS {
+            return;
+        }
         let (level, below) = levels.split_first_mut().expect("a level for each division");
-        level.prepare(solid, region);
-        let bundle = Bundle { cones: &level.cones, groups: &level.groups, middle: solid.middle(region) };
+        let bundle = level.bundle(solid, region);
         if region.cubes == SIDE {
             if found.fetch_add(1, Ordering::Relaxed) < MAX_BLOCKS {
                 self.plant(solid, region, &bundle);
             }
             return;
         }
-        for octant in 0..8 {
-            let octant = Octant::of(region, octant);
+        for octant in Octant::all(region) {
             below[0].cones.clear();
             prune(&bundle, octant.around, EDGE, &mut self.answers, &mut below[0].cones);
             if !below[0].cones.is_empty() {
@@ -233,8 +148,7 @@ impl Grove {
             cones: [0; 128],
         };
         let mut moved = [[Point3::origin(); 64]; 2];
-        for octant in 0..8 {
-            let Octant { region, around } = Octant::of(region, octant);
+        for (octant, Octant { region, around }) in Octant::all(region).enumerate() {
             let first_cone = self.cones.len();
             let middle = prune(bundle, around, 0.0, &mut self.answers, &mut self.cones);
             let leaf = Leaf {
@@ -260,7 +174,11 @@ impl Grove {
             for i in 0..SITES {
                 let (kind, bit) = (i >> 3, bit_of(octant, i & 7));
                 let cone = cones[places[i]];
-                let blur = 4.0 * ROUNDING * (distances[i].abs() + 4.0 + (solid.distances[cone as usize].radius / solid.lattice.cube) as f32);
+                let blur = 4.0
+                    * ROUNDING
+                    * (distances[i].abs()
+                        + 4.0
+                        + (solid.distances[cone as usize].radius / solid.lattice.cube) as f32);
                 if distances[i].abs() > CLEAR as f32 + blur {
                     block.inside[kind] |= u64::from(distances[i] < 0.0) << bit;
                     block.cones[64 * kind + bit] = cone;
@@ -370,5 +288,78 @@ impl Bundle<'_> {
             }
         }
         unmoved
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::stage::surface::{RoundCone, distance::Distance};
+
+    /// Thirty cones in 20 mm, thick and thin, some along the axes.
+    pub(in crate::stage::surface) fn cones() -> Vec<RoundCone> {
+        let at = |i: i32| Point3::new(f64::from(i * 7 % 20), f64::from(i * 11 % 19), f64::from(i * 5 % 17));
+        let cone = |i: i32| {
+            let end = if i % 3 == 0 { at(i) + nalgebra::Vector3::y() * 4.0 } else { at(i + 1) };
+            RoundCone { centres: [at(i), end], radii: [0.4 + f64::from(i % 4), 1.5] }
+        };
+        (0..30).map(cone).collect()
+    }
+
+    fn grown(cones: &[RoundCone], cube: f64, check: impl Fn(&Solid, &Grove)) {
+        let distances: Vec<Distance> = cones.iter().map(Distance::to).collect();
+        let lattice = Lattice::around(cones, cube);
+        let solid = Solid { lattice: &lattice, distances: &distances };
+        let all: Vec<u32> = (0..cones.len() as u32).collect();
+        let region = Region { corner: [0; 3], cubes: lattice.blocks_along().unwrap() * SIDE };
+        let mut grove = Grove::default();
+        grove.grow(&solid, region, &all, &AtomicUsize::new(0));
+        check(&solid, &grove);
+    }
+
+    #[test]
+    fn questions_follow_the_surface_and_not_the_volume_nor_the_cones() {
+        // A bent limb of 50 mm across as ever more cones.
+        let limb = |count: i32| -> Vec<RoundCone> {
+            let at = |i: i32| {
+                let s = f64::from(i) / f64::from(count);
+                Point3::new(200.0 * s, 30.0 * (4.0 * s).sin(), 0.0)
+            };
+            (0..count).map(|i| RoundCone { centres: [at(i), at(i + 1)], radii: [25.0; 2] }).collect()
+        };
+        // Each of a leaf's cones is asked about each of its points.
+        let asked = |count, cube| {
+            let asked = std::cell::Cell::new(0);
+            grown(&limb(count), cube, |_, grove| asked.set(grove.cones.len() * SITES));
+            f64::from(asked.get() as u32)
+        };
+        let (coarse, fine) = (asked(50, 3.0), asked(50, 1.5));
+        assert!(fine / coarse < 4.5, "{coarse} {fine}");
+        let sparse_per_leaf = asked(200, 1.5) / fine;
+        assert!(sparse_per_leaf < 2.5, "{sparse_per_leaf}");
+    }
+
+    #[test]
+    fn points_are_as_the_nearest_of_all_cones_says_and_moved_ones_clear() {
+        grown(&cones(), 0.7, |solid, grove| {
+            let mut moved = 0;
+            for block in &grove.blocks {
+                for (kind, bit) in (0..2).flat_map(|kind| (0..64).map(move |bit| (kind, bit))) {
+                    let p = grove.position(solid, block, kind, bit);
+                    let far = |cone: &Distance| cone.at(&p);
+                    let least = solid.distances.iter().map(far).fold(f64::INFINITY, f64::min);
+                    assert_eq!(block.inside[kind] >> bit & 1 == 1, least < 0.0, "{p}");
+                    let own = far(&solid.distances[block.cone(kind, bit) as usize]);
+                    assert!(least > 0.0 || own < 0.0, "{p} {own} {least}");
+                    let way = (p - solid.lattice.position(point_of(block.corner, bit, kind))).norm();
+                    assert!(way <= MAX_SHIFT * solid.lattice.cube * (1.0 + 1e-9), "{way}");
+                    if way > 0.0 {
+                        assert!(least.abs() > 0.99 * CLEAR * solid.lattice.cube);
+                        moved += 1;
+                    }
+                }
+            }
+            assert!(moved > 100, "{moved}");
+        });
     }
 }

@@ -4,7 +4,6 @@
 //! middle of their region; only those that come within rounding of the least are asked exactly.
 
 use nalgebra::Point3;
-use wide::CmpLt;
 
 use super::{
     distance::Distance,
@@ -84,18 +83,20 @@ impl Group {
 /// The square of how far a point is from the centre of the ball that decides its distance, and where on the
 /// axis that is; from where the point is along the axis, and the square of how far away from it.
 #[inline(always)]
-pub(super) fn nearest_ball(
-    along: Lanes,
-    away: Lanes,
-    [low, high, lean]: Vectors,
-) -> (Lanes, Lanes) {
+pub(super) fn nearest_ball(along: Lanes, away: Lanes, [low, high, lean]: Vectors) -> (Lanes, Lanes) {
     let s = (along + lean * away.sqrt()).fast_min(high).fast_max(low);
     let short = along - s;
     (short * short + away, s)
 }
 
 /// Appends what [`Bundle`] keeps of `cones`.
-pub(super) fn prepare(cones: &[u32], all: &[Distance], middle: &Point3<f64>, cube: f64, groups: &mut Vec<Group>) {
+pub(super) fn prepare(
+    cones: &[u32],
+    all: &[Distance],
+    middle: &Point3<f64>,
+    cube: f64,
+    groups: &mut Vec<Group>,
+) {
     groups.extend(cones.chunks(LANES).map(|cones| Group::of(cones, all, middle, 1.0 / cube)));
 }
 

@@ -65,30 +65,29 @@ impl Distance {
     /// left at a ball between the ends, that is the place, and otherwise it is at one of the ends.
     pub(super) fn exit(&self, from: &Point3<f64>, step: &Vector3<f64>) -> Option<f64> {
         let from_start = from - self.start;
+        let square = step.norm_squared();
+        let of_ball = |s: f64| {
+            let from_centre = from_start - self.axis * s;
+            let radius = self.radius + self.slope * s;
+            exit_of(square, from_centre.dot(step), from_centre.norm_squared() - radius * radius)
+        };
         if self.length == 0.0 {
-            return leave(step.norm_squared(), from_start.dot(step), from_start.norm_squared(), self.radius);
+            return of_ball(0.0);
         }
         let (along, ahead) = (from_start.dot(&self.axis), step.dot(&self.axis));
         let tangent = 1.0 / (1.0 - self.slope * self.slope);
-        // The ball of which the ray is deepest inside stands at `deepest` plus `moved` a step.
+        // A point is deepest, by squares, in the ball at `deepest`, which moves by `moved` a step.
         let base = along + self.slope * self.radius;
         let (deepest, moved) = (base * tangent, ahead * tangent);
         let side = exit_of(
-            step.norm_squared() - ahead * moved,
+            square - ahead * moved,
             from_start.dot(step) - base * moved,
             from_start.norm_squared() - self.radius * self.radius - base * deepest,
         );
         if let Some(share) = side.filter(|share| (0.0..=self.length).contains(&(deepest + moved * share))) {
             return Some(share);
         }
-        [0.0, self.length]
-            .into_iter()
-            .filter_map(|s| {
-                let from_centre = from_start - self.axis * s;
-                let radius = self.radius + self.slope * s;
-                leave(step.norm_squared(), from_centre.dot(step), from_centre.norm_squared(), radius)
-            })
-            .reduce(f64::max)
+        [of_ball(0.0), of_ball(self.length)].into_iter().flatten().reduce(f64::max)
     }
 
     /// Where `p` is along the axis and away from it, and the ball that decides its distance, all in mm.
@@ -98,12 +97,6 @@ impl Distance {
         let away = (from_start - self.axis * along).norm();
         (along, away, (along + self.lean * away).clamp(0.0, self.length))
     }
-}
-
-/// Where a ray leaves a ball, from the square of its step, the product of that with its start from the
-/// centre, and the square of the latter.
-fn leave(step: f64, product: f64, start: f64, radius: f64) -> Option<f64> {
-    exit_of(step, product, start - radius * radius)
 }
 
 /// The zero of a t^2 + 2 b t + c at which it grows.
@@ -135,6 +128,30 @@ mod tests {
             let got = tapered.at(&Point3::new(x, 0.0, y));
             assert!((got - least).abs() < 1e-8, "({x}, {y}): {got} {least}");
         }
+    }
+
+    #[test]
+    fn a_ray_leaves_where_the_distance_is_zero_and_grows() {
+        let at = |i: i32, n: i32| f64::from(i * n % 17) - 8.0;
+        let mut left = 0;
+        for (radii, i) in [[2.0, 5.0], [5.0, 2.0], [3.0, 3.0], [9.0, 1.0], [0.5, 10.4]]
+            .iter()
+            .flat_map(|r| (0..40).map(move |i| (*r, i)))
+        {
+            let cone = cone(10.0, radii);
+            let from = Point3::new(f64::from(i % 11), 0.3 * at(i, 5), 0.3 * at(i, 7));
+            let step = Vector3::new(at(i, 3), at(i, 11), at(i, 13) + 0.5);
+            if cone.at(&from) >= 0.0 {
+                continue;
+            }
+            let share = cone.exit(&from, &step).unwrap();
+            let beyond = from + step * (share + 1e-3);
+            assert!(cone.at(&(from + step * share)).abs() < 1e-7, "{radii:?} {i}");
+            assert!(share > 0.0 && cone.at(&beyond) > 0.0, "{radii:?} {i}");
+            left += 1;
+        }
+        assert!(left > 100, "{left}");
+        assert_eq!(cone(10.0, [1.0, 2.0]).exit(&Point3::new(0.0, 9.0, 0.0), &Vector3::x()), None);
     }
 
     #[test]

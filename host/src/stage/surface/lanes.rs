@@ -31,9 +31,3 @@ pub(super) fn plus(a: Vectors, b: Vectors) -> Vectors {
 pub(super) fn less(a: Vectors, b: Vectors, times: Lanes) -> Vectors {
     [a[0] - b[0] * times, a[1] - b[1] * times, a[2] - b[2] * times]
 }
-
-/// The square root of what is not below zero but by rounding.
-#[inline(always)]
-pub(super) fn root(x: Lanes) -> Lanes {
-    x.fast_max(Lanes::ZERO).sqrt()
-}

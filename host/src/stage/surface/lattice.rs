@@ -150,7 +150,8 @@ pub(super) const TETRAHEDRA: [Tetrahedron; 12] = {
             (_, 0) => (0, first),
             _ => (0, first | third),
         };
-        let (low, high) = (Corner { kind: 1 - kind, ahead: across }, Corner { kind: 1 - kind, ahead: across | next });
+        let (low, high) =
+            (Corner { kind: 1 - kind, ahead: across }, Corner { kind: 1 - kind, ahead: across | next });
         let (third_corner, fourth) = if above == 1 { (high, low) } else { (low, high) };
         let corners =
             [Corner { kind, ahead: start }, Corner { kind, ahead: start | first }, third_corner, fourth];
@@ -194,4 +195,56 @@ pub(super) fn cube_ahead(bit: usize, ahead: usize) -> (usize, usize) {
 pub(super) fn point_of(block_corner: [i32; 3], bit: usize, kind: usize) -> [i32; 3] {
     let cube = [bit >> 4, bit >> 2 & 3, bit & 3];
     [0, 1, 2].map(|axis| block_corner[axis] + (2 * cube[axis] + kind) as i32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A corner's place in half cubes, of the cube at the origin.
+    fn place(corner: Corner) -> Point3<f64> {
+        let along = |bit: usize| (2 * (corner.ahead >> bit & 1) + corner.kind) as f64;
+        Point3::new(along(2), along(1), along(0))
+    }
+
+    #[test]
+    fn the_tetrahedra_of_a_cube_are_all_right_way_out_and_fill_it() {
+        let volumes = TETRAHEDRA.map(|tetrahedron| {
+            let [a, b, c, d] = tetrahedron.corners.map(place);
+            (b - a).cross(&(c - a)).dot(&(d - a)) / 6.0
+        });
+        assert!(volumes.iter().all(|&volume| volume > 0.0), "{volumes:?}");
+        assert!((volumes.iter().sum::<f64>() - 8.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_edges_of_tetrahedra_have_their_ends_and_each_one_name() {
+        for tetrahedron in TETRAHEDRA {
+            for (i, j) in (0..4).flat_map(|j| (0..j).map(move |i| (i, j))) {
+                let edge = tetrahedron.edges[i][j];
+                assert_eq!(edge, tetrahedron.edges[j][i]);
+                let ends = ENDS[edge.direction].map(|end| {
+                    assert_eq!(end.ahead & edge.ahead, 0);
+                    Corner { ahead: end.ahead | edge.ahead, ..end }
+                });
+                let corners = [tetrahedron.corners[i], tetrahedron.corners[j]];
+                assert!(ends == corners || ends == [corners[1], corners[0]], "{edge:?} {corners:?}");
+            }
+        }
+        let mut steps: Vec<_> = ENDS.iter().map(|[a, b]| (place(*b) - place(*a)).map(|x| x as i32)).collect();
+        steps.sort_by_key(|step| (step.x, step.y, step.z));
+        steps.dedup();
+        // Along an axis there is one edge from a corner and one from a middle.
+        assert_eq!(steps.len(), 11);
+    }
+
+    #[test]
+    fn words_ahead_are_the_bits_ahead() {
+        let blocks = [1, 2, 3, 4, 5, 6, 7, 8_u64].map(|i| i.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+        let seen = seen_ahead(blocks);
+        for (ahead, bit) in (0..8).flat_map(|ahead| (0..64).map(move |bit| (ahead, bit))) {
+            let (block, there) = cube_ahead(bit, ahead);
+            assert_eq!(seen[ahead] >> bit & 1, blocks[block] >> there & 1, "{ahead} {bit}");
+        }
+    }
 }

@@ -8,8 +8,9 @@
 use nalgebra::Point3;
 
 use super::{
-    block::{Block, Grove, Solid, bits},
+    block::{Block, Grove, bits},
     lattice::{EDGES, ENDS, Edge, TETRAHEDRA, cube_ahead, seen_ahead},
+    region::Solid,
 };
 
 /// A vertex is this close to the surface, in cubes.
@@ -94,12 +95,7 @@ impl Cut {
     }
 
     /// Puts the block's vertices into `vertices`, mm.
-    pub(super) fn put_vertices(
-        &self,
-        solid: &Solid,
-        blocks: &Blocks,
-        vertices: &mut [Point3<f64>],
-    ) {
+    pub(super) fn put_vertices(&self, solid: &Solid, blocks: &Blocks, vertices: &mut [Point3<f64>]) {
         let mut vertices = vertices.iter_mut();
         for (direction, &edges) in self.edges.iter().enumerate() {
             for bit in bits(edges) {
@@ -109,7 +105,8 @@ impl Cut {
                     (block.inside[corner.kind] >> bit & 1, grove, block, corner.kind, bit)
                 });
                 let [from, to] = if ends[0].0 == 1 { ends } else { [ends[1], ends[0]] };
-                let [start, end] = [from, to].map(|(_, grove, block, kind, bit)| grove.position(solid, block, kind, bit));
+                let [start, end] =
+                    [from, to].map(|(_, grove, block, kind, bit)| grove.position(solid, block, kind, bit));
                 let cone = from.2.cone(from.3, from.4);
                 *vertices.next().expect("a place for each vertex") =
                     crossing(solid, blocks, [start, end], cone);
@@ -142,7 +139,7 @@ impl Cut {
                     1 => put([vertex(0, 1), vertex(0, 2), vertex(0, 3)]),
                     2 => {
                         let ring = [vertex(0, 2), vertex(0, 3), vertex(1, 3), vertex(1, 2)];
-                        split(ring, vertices).map(&mut put);
+                        split(ring, vertices).into_iter().for_each(&mut put);
                     }
                     _ => put([vertex(0, 1), vertex(0, 3), vertex(0, 2)]),
                 }
@@ -161,12 +158,7 @@ fn split([p, q, r, s]: [u32; 4], vertices: &[Point3<f64>]) -> [[u32; 3]; 2] {
 ///
 /// It leaves the cone that decides at its start; where it does, another may contain it, of which it is
 /// followed to its end, until none does.
-fn crossing(
-    solid: &Solid,
-    blocks: &Blocks,
-    [from, to]: [Point3<f64>; 2],
-    mut cone: u32,
-) -> Point3<f64> {
+fn crossing(solid: &Solid, blocks: &Blocks, [from, to]: [Point3<f64>; 2], mut cone: u32) -> Point3<f64> {
     let step = to - from;
     let mut share = 0.0;
     for _ in 0..MAX_STEPS {
@@ -180,4 +172,25 @@ fn crossing(
         cone = deeper;
     }
     from + step * share.clamp(END, 1.0 - END)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_orders_of_corners_are_even_and_begin_with_the_fewer() {
+        for (set, order) in FEWER_FIRST.iter().enumerate() {
+            let swaps =
+                (0..4).flat_map(|j| (0..j).map(move |i| (i, j))).filter(|&(i, j)| order[i] > order[j]);
+            assert_eq!(swaps.count() % 2, 0, "{order:?}");
+            let inside = order.map(|corner| set >> corner & 1 == 1);
+            match set.count_ones() {
+                1 => assert_eq!(inside, [true, false, false, false]),
+                2 => assert_eq!(inside, [true, true, false, false]),
+                3 => assert_eq!(inside, [false, true, true, true]),
+                _ => {}
+            }
+        }
+    }
 }

@@ -13,8 +13,6 @@
 //!   than the rival's ball everywhere: |V + w| >= |V' + w| + r - r'. This is sharp where balls follow one
 //!   another closely.
 
-use wide::CmpLt;
-
 use super::{
     bundle::{Bundle, Group, ROUNDING, nearest_ball},
     lanes::{LANES, Lanes, Vectors, all, dot, less, plus},
@@ -91,7 +89,8 @@ pub(super) fn prune(
                 answer.beaten = answer.beaten.fast_max(by_ball(group, rival, offset, around.reach));
             }
         };
-        let axis = bundle.groups[first / LANES].axis.map(|axis| axis.to_array()[first % LANES] * around.reach);
+        let axis =
+            bundle.groups[first / LANES].axis.map(|axis| axis.to_array()[first % LANES] * around.reach);
         if axis == [0.0; 3] {
             compare(answers, rival);
         } else {
@@ -171,7 +170,8 @@ fn by_distance(answer: &Answer, rival: Rival, reach: f32) -> Lanes {
     let rounding = (answer.from_centre + Lanes::splat(rival.from_centre + reach)) * Lanes::splat(ROUNDING);
     let further = answer.distance - Lanes::splat(rival.distance) - rounding;
     // Blurred gradients count as opposite ones.
-    let blurred = answer.from_centre.simd_lt(Lanes::splat(BLUR)).bitselect(Lanes::splat(f32::INFINITY), Lanes::ZERO);
+    let blurred =
+        answer.from_centre.simd_lt(Lanes::splat(BLUR)).bitselect(Lanes::splat(f32::INFINITY), Lanes::ZERO);
     further - (tangent + blurred).fast_min(Lanes::splat(2.0 * reach))
 }
 
