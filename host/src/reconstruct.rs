@@ -159,7 +159,7 @@ fn finish(
         return Err(outcome.findings.iter().find(|f| erased(f)).map_or(Refusal::Behind, |f| (*f).into()));
     }
     let cell = options.cell.unwrap_or_else(|| default_cell(&camera, &grown.cones));
-    let body = keep_largest_body(&surface(&grown.cones, cell)?);
+    let body = keep_largest_body(surface(&grown.cones, cell)?);
     clock.lap("surface");
     let turned = |curves: Curves| Curves {
         points: curves.points.iter().map(|p| camera.to_left_camera(*p)).collect(),

@@ -34,5 +34,5 @@ pub fn inflation([left, right]: [&Outline; 2], camera: &RectifiedCamera, cell: f
     };
     let balls: Vec<SolidBall> = left.pixels().enumerate().map(ball).filter(|b| b.radius > 0.0).collect();
     let inflated = surface(&spheres(&outermost(&balls, pixel)), cell);
-    inflated.map(|mesh| keep_largest_body(&mesh).mesh).unwrap_or_default()
+    inflated.map(|mesh| keep_largest_body(mesh).mesh).unwrap_or_default()
 }

@@ -18,53 +18,58 @@ pub struct LargestBody {
 
 /// Keeps the body of greatest volume of a closed mesh, and nothing else: not its hollows either.
 #[must_use]
-pub fn keep_largest_body(mesh: &Mesh) -> LargestBody {
-    let (of_face, count) = pieces(mesh);
-    let mut volumes = vec![0.0; count];
-    for (face, &piece) in of_face.iter().enumerate() {
-        volumes[piece] += mesh.volume_under(face);
+pub fn keep_largest_body(mesh: Mesh) -> LargestBody {
+    let (piece, count) = pieces(&mesh);
+    if count <= 1 {
+        return LargestBody { mesh, dropped: 0, dropped_volume: 0.0 };
     }
-    let Some(largest) = (0..count).max_by(|&a, &b| volumes[a].total_cmp(&volumes[b])) else {
-        return LargestBody { mesh: Mesh::default(), dropped: 0, dropped_volume: 0.0 };
-    };
+    let of_face = |face: usize| piece[mesh.faces[face][0] as usize] as usize;
+    let mut volumes = vec![0.0; count];
+    for face in 0..mesh.faces.len() {
+        volumes[of_face(face)] += mesh.volume_under(face);
+    }
+    let largest = (1..count).fold(0, |best, i| if volumes[i] >= volumes[best] { i } else { best });
     let bodies = || volumes.iter().filter(|&&volume| volume > 0.0);
     let total: f64 = bodies().sum();
     LargestBody {
-        mesh: extract(mesh, |face| of_face[face] == largest),
         dropped: bodies().count().saturating_sub(1),
         dropped_volume: if total > 0.0 { 1.0 - volumes[largest] / total } else { 0.0 },
+        mesh: extract(&mesh, |face| of_face(face) == largest),
     }
 }
 
-/// The connected piece of each face, numbered from 0, and how many there are.
-fn pieces(mesh: &Mesh) -> (Vec<usize>, usize) {
-    let mut parent: Vec<usize> = (0..mesh.vertices.len()).collect();
-    for face in &mesh.faces {
-        let [a, b, c] = face.map(|corner| corner as usize);
-        join(&mut parent, a, b);
-        join(&mut parent, b, c);
+/// The connected piece of each vertex, numbered from 0 in the order of their first vertices, and how many
+/// there are; vertices of no face are pieces of their own.
+fn pieces(mesh: &Mesh) -> (Vec<u32>, usize) {
+    let mut parent: Vec<u32> = (0..mesh.vertices.len() as u32).collect();
+    for &[a, b, c] in &mesh.faces {
+        let joined = join(&mut parent, a, b);
+        join(&mut parent, joined, c);
     }
-    let mut number = vec![None; mesh.vertices.len()];
+    // A parent never comes after its child, so one pass names them all.
     let mut count = 0;
-    let of_face = mesh.faces.iter().map(|face| {
-        *number[root(&mut parent, face[0] as usize)].get_or_insert_with(|| {
-            count += 1;
-            count - 1
-        })
-    });
-    (of_face.collect(), count)
+    for vertex in 0..parent.len() {
+        let above = parent[vertex] as usize;
+        parent[vertex] = if above == vertex { count } else { parent[above] };
+        count += u32::from(above == vertex);
+    }
+    (parent, count as usize)
 }
 
-fn join(parent: &mut [usize], a: usize, b: usize) {
+/// Joins the sets of `a` and `b`, and returns their root.
+fn join(parent: &mut [u32], a: u32, b: u32) -> u32 {
     let (a, b) = (root(parent, a), root(parent, b));
-    parent[a.max(b)] = a.min(b);
+    let (low, high) = (a.min(b), a.max(b));
+    parent[high as usize] = low;
+    low
 }
 
 /// The representative of `x` in a forest of disjoint sets, whose paths are halved on the way.
-fn root(parent: &mut [usize], mut x: usize) -> usize {
-    while parent[x] != x {
-        parent[x] = parent[parent[x]];
-        x = parent[x];
+fn root(parent: &mut [u32], mut x: u32) -> u32 {
+    while parent[x as usize] != x {
+        let above = parent[parent[x as usize] as usize];
+        parent[x as usize] = above;
+        x = above;
     }
     x
 }
@@ -110,7 +115,7 @@ mod tests {
     #[test]
     fn keeps_the_largest_and_tells_what_it_dropped() {
         let meshes = [tetrahedron(0.0, 1.0), tetrahedron(50.0, 3.0), tetrahedron(90.0, 2.0)];
-        let got = keep_largest_body(&together(&meshes));
+        let got = keep_largest_body(together(&meshes));
         assert!((got.mesh.volume() - meshes[1].volume()).abs() < 1e-9);
         assert_eq!((got.mesh.vertices.len(), got.mesh.faces.len(), got.dropped), (4, 4, 2));
         assert!((got.dropped_volume - 9.0 / 36.0).abs() < 1e-12);
@@ -119,13 +124,13 @@ mod tests {
     #[test]
     fn a_hollow_is_filled_and_is_no_body() {
         let solid = tetrahedron(0.0, 3.0);
-        let got = keep_largest_body(&together(&[tetrahedron(0.0, -0.5), solid.clone()]));
+        let got = keep_largest_body(together(&[tetrahedron(0.0, -0.5), solid.clone()]));
         assert_eq!((got.mesh.faces.len(), got.dropped, got.dropped_volume), (4, 0, 0.0));
         assert!((got.mesh.volume() - solid.volume()).abs() < 1e-9);
     }
 
     #[test]
     fn nothing_stays_nothing() {
-        assert_eq!(keep_largest_body(&Mesh::default()).mesh, Mesh::default());
+        assert_eq!(keep_largest_body(Mesh::default()).mesh, Mesh::default());
     }
 }
