@@ -8,6 +8,7 @@ pub mod calibration;
 
 // What happens to it.
 pub mod memory;
+pub mod runs;
 pub mod stage;
 pub mod reconstruct;
 

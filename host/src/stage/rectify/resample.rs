@@ -10,11 +10,17 @@ use rayon::prelude::*;
 use super::canvas::border;
 use super::{PixelBox, RectifiedCamera, Turned};
 
-/// The rectified image of one eye, whose axis is at column `cx`.
-pub(super) fn resample(eye: &Turned, to: &RectifiedCamera, cx: f64, raw: &GrayImage) -> GrayImage {
+/// Fill `rectified` with the rectified image of one eye, whose axis is at column `cx`.
+pub(super) fn resample(
+    eye: &Turned,
+    to: &RectifiedCamera,
+    cx: f64,
+    raw: &GrayImage,
+    rectified: &mut GrayImage,
+) {
     let reach = reach(eye);
     let back = eye.turn.inverse();
-    let mut rectified = GrayImage::new(to.width, to.height);
+    resize(rectified, to.width, to.height);
     rectified.par_chunks_exact_mut(to.width as usize).enumerate().for_each(|(v, row)| {
         let y = (v as f64 - to.cy) / to.f;
         for (u, grey) in (0_u32..).zip(row) {
@@ -22,7 +28,14 @@ pub(super) fn resample(eye: &Turned, to: &RectifiedCamera, cx: f64, raw: &GrayIm
             *grey = bilinear(raw, eye.camera.pixel_of(pulled_in(&ray, reach)));
         }
     });
-    rectified
+}
+
+/// Give an image another size, in the memory that it has if that is enough; its pixels are of no use then.
+fn resize(image: &mut GrayImage, width: u32, height: u32) {
+    let mut bytes = std::mem::take(image).into_raw();
+    bytes.resize(width as usize * height as usize, 0);
+    // As many bytes as pixels always make an image.
+    *image = GrayImage::from_raw(width, height, bytes).unwrap_or_default();
 }
 
 /// How far from the optical axis the raw image sees, in the plane at distance 1.
