@@ -149,7 +149,8 @@ mod tests {
             runs.build(points.iter().copied());
             for _ in 0..200 {
                 let at = place(30.0);
-                let naive = (0..count).map(|k| (k, square(&points[k], &at))).min_by(|a, b| a.1.total_cmp(&b.1));
+                let naive =
+                    (0..count).map(|k| (k, square(&points[k], &at))).min_by(|a, b| a.1.total_cmp(&b.1));
                 assert_eq!(runs.nearest(&at, 1.0, |k| square(&points[k], &at)), naive);
                 let odd = |k: usize| if k % 2 == 1 { square(&points[k], &at) } else { f64::INFINITY };
                 let naive = naive_odd(count, odd);

@@ -32,8 +32,7 @@ pub fn inflation([left, right]: [&Outline; 2], camera: &RectifiedCamera, cell: f
         at: at.coords,
         place,
     };
-    let mut balls: Vec<SolidBall> =
-        left.pixels().enumerate().map(ball).filter(|b| b.radius > 0.0).collect();
+    let mut balls: Vec<SolidBall> = left.pixels().enumerate().map(ball).filter(|b| b.radius > 0.0).collect();
     Outermost::default().keep(&mut balls, pixel);
     let mut cones = Vec::new();
     spheres(&balls, &mut cones);

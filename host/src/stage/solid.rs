@@ -169,12 +169,16 @@ mod tests {
     fn what_sticks_out_is_what_no_larger_ball_holds() {
         let mut random = Random::new(3);
         let mut outermost = Outermost::default();
-        for (count, step, pixel) in [(0, 1.0, 1.0), (1, 1.0, 1.0), (400, 0.3, 0.6), (400, 0.02, 0.0), (300, 30.0, 1.0)] {
+        for (count, step, pixel) in
+            [(0, 1.0, 1.0), (1, 1.0, 1.0), (400, 0.3, 0.6), (400, 0.02, 0.0), (300, 30.0, 1.0)]
+        {
             let mut walk = Point3::new(0.0, 0.0, 500.0);
             let mut ball = |place: usize| {
                 walk += nalgebra::Vector3::from_fn(|_, _| step * random.normal());
                 // Some radii coincide.
-                let radius = 5.0 + (4.0 * random.uniform()).floor() + if place % 2 == 0 { random.normal() } else { 0.0 };
+                let radius = 5.0
+                    + (4.0 * random.uniform()).floor()
+                    + if place % 2 == 0 { random.normal() } else { 0.0 };
                 SolidBall { centre: walk, radius, at: walk.coords.xy(), place }
             };
             let balls: Vec<SolidBall> = (0..count).map(&mut ball).collect();
