@@ -115,7 +115,8 @@ pub fn reconstruct(
     options: &Options,
     observer: &mut impl Observer,
 ) -> Result<Reconstruction, Refusal> {
-    Workspace::default().reconstruct([&left, &right], calibration, options, observer)
+    let views = [left, right];
+    Workspace::default().reconstruct(views.each_ref(), calibration, options, observer)
 }
 
 /// Reconstruct the object of a shape that a device has sent: it stands in `memory`, and `outcome` with it, as
