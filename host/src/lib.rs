@@ -9,6 +9,7 @@ pub mod calibration;
 // What happens to it.
 pub mod memory;
 pub mod wide;
+pub mod runs;
 pub mod stage;
 pub mod reconstruct;
 

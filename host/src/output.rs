@@ -28,20 +28,21 @@ use tempfile::NamedTempFile;
 /// Sub-folder of the pictures.
 pub(crate) const PICTURES: &str = "pictures";
 
-/// Write all files of a run into `folder`, which is created if it is missing.
+/// Write all files of a run into `folder`, which is created if it is missing; returns the report's text.
 ///
 /// # Errors
 /// [`ExportError`] with the file or folder that could not be written.
-pub fn write(folder: &Path, run: &Run<'_>) -> Result<(), ExportError> {
+pub fn write(folder: &Path, run: &Run<'_>) -> Result<Vec<u8>, ExportError> {
     let created = create(folder)?;
-    let result = write_into(folder, run);
+    let report = numbers::json(run);
+    let result = write_into(folder, run, &report);
     if result.is_err() {
         for folder in created.iter().rev() {
             // What still holds files stays: then it is no longer ours alone.
             let _ = std::fs::remove_dir(folder);
         }
     }
-    result
+    result.map(|()| report)
 }
 
 /// Whether a folder holds what a run left.
@@ -89,14 +90,14 @@ fn failed(path: &Path, source: io::Error) -> ExportError {
     ExportError::Io { path: path.to_path_buf(), source }
 }
 
-fn write_into(folder: &Path, run: &Run<'_>) -> Result<(), ExportError> {
+fn write_into(folder: &Path, run: &Run<'_>, report: &[u8]) -> Result<(), ExportError> {
     let staged = tempfile::Builder::new()
         .prefix(".unfinished-")
         .tempdir_in(folder)
         .map_err(|source| failed(folder, source))?;
     let stage = Stage { folder, staged: staged.path() };
     let mut names = stage.models(run.reconstruction)?;
-    names.push(stage.bytes("report.json", &numbers::json(run))?);
+    names.push(stage.bytes("report.json", report)?);
     let drawn = pictures::draw(run);
     if !drawn.is_empty() {
         let pictures = stage.staged.join(PICTURES);

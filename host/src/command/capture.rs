@@ -104,6 +104,9 @@ pub struct Args {
     /// Draw no pictures of the stages
     #[arg(long)]
     no_pictures: bool,
+    /// Tell on standard error how long each stage took
+    #[arg(long, conflicts_with = "only_record")]
+    timings: bool,
     /// Print one JSON document at the end instead of text
     #[arg(long)]
     json: bool,

@@ -33,11 +33,12 @@ use shared::wire::{Decoder, MAX_FRAME, ToDevice};
 use super::connect::{
     PortArgs, check_calibration, hello_as_json, link_as_json, link_in_words, model_of, progress, version,
 };
-use super::model::{self, Model};
+use super::model::{self, Model, Place};
 use super::options::GrowArgs;
 use super::table::{count, sides};
+use super::timings::Timings;
 use super::{Failure, interruption, note, say, words_of};
-use crate::reconstruct::{Options, Refusal};
+use crate::reconstruct::{Options, Refusal, Workspace};
 use crate::report::words::{parse_polarity, parse_threshold};
 use crate::source::serial::inbox::{Hello, Inbox, Message, Pair};
 use crate::source::serial::link::frames;
@@ -75,6 +76,9 @@ pub struct Args {
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "ossature-out")]
     out: PathBuf,
+    /// Tell on standard error how long each stage took
+    #[arg(long)]
+    timings: bool,
     /// Print lines of JSON instead of text
     #[arg(long)]
     pub(super) json: bool,
@@ -88,7 +92,7 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let model = model_of(&args.calib)?;
     let options = args.grow.device_options();
-    let mut desk = Desk::new((&model, &options), &args.out, args.json);
+    let mut desk = Desk::new((&model, &options), &args.out, (args.json, args.timings));
     let end = args.seconds.map(|seconds| Instant::now() + Duration::from_secs(seconds.into()));
     let stop = interruption()?;
     let mut session = begin(args, &model, &mut desk)?;
@@ -169,9 +173,14 @@ fn start(args: &Args, session: &mut Session) -> Result<(), SessionError> {
 /// # Errors
 ///
 /// If the recording cannot be read, or no pair gives a model.
-pub(super) fn replay(path: &Path, options: &Options, out: &Path, json: bool) -> Result<(), Failure> {
+pub(super) fn replay(
+    path: &Path,
+    options: &Options,
+    out: &Path,
+    (json, timings): (bool, bool),
+) -> Result<(), Failure> {
     let recording = Recording::read(path)?;
-    let mut desk = Desk::new((&recording.calibration, options), out, json);
+    let mut desk = Desk::new((&recording.calibration, options), out, (json, timings));
     let (mut inbox, mut tally) = (Inbox::new()?, Tally::default());
     for (k, bytes) in recording.connections.iter().enumerate() {
         let mut buffer = vec![0; MAX_FRAME];
@@ -203,6 +212,9 @@ struct Desk<'a> {
     options: &'a Options,
     out: &'a Path,
     json: bool,
+    /// If they are wanted.
+    timings: Option<Timings>,
+    workspace: Workspace,
     bar: ProgressBar,
     start: Instant,
     pairs: u32,
@@ -210,9 +222,14 @@ struct Desk<'a> {
 }
 
 impl<'a> Desk<'a> {
-    fn new((model, options): (&'a PairModel, &'a Options), out: &'a Path, json: bool) -> Self {
-        let (bar, start) = (progress(), Instant::now());
-        Self { model, options, out, json, bar, start, pairs: 0, models: 0 }
+    fn new(
+        (model, options): (&'a PairModel, &'a Options),
+        out: &'a Path,
+        (json, timings): (bool, bool),
+    ) -> Self {
+        let (bar, start, workspace) = (progress(), Instant::now(), Workspace::default());
+        let timings = timings.then(Timings::begin);
+        Self { model, options, out, json, timings, workspace, bar, start, pairs: 0, models: 0 }
     }
 
     /// A line to standard error.
@@ -247,10 +264,14 @@ impl<'a> Desk<'a> {
         self.pairs += 1;
         let folder = self.out.join(format!("{:06}", self.pairs));
         let told = heading(&pair);
-        match model::receive((inbox, *pair), self.model, self.options, &folder) {
+        let place = Place { folder: &folder, report: self.json };
+        match model::receive((inbox, *pair), self.model, self.options, place, &mut self.workspace) {
             Ok(model) => {
                 self.models += 1;
-                let warnings = model.warnings();
+                if let Some(timings) = &mut self.timings {
+                    timings.add(None, &model);
+                }
+                let warnings = &model.warnings;
                 self.line(
                     || {
                         let (mut told, more) = (
@@ -260,7 +281,7 @@ impl<'a> Desk<'a> {
                         merge(&mut told, more);
                         told
                     },
-                    || described(&told, &model, &warnings, &folder),
+                    || described(&told, &model, warnings, &folder),
                 )
             }
             Err(failure) if failure.is::<Refusal>() => {
@@ -288,6 +309,9 @@ impl<'a> Desk<'a> {
 
     fn close(self, tally: &Tally) -> Result<(), Failure> {
         self.bar.finish_and_clear();
+        if let Some(timings) = &self.timings {
+            timings.tell();
+        }
         let (models, pairs) = (self.models, self.pairs);
         self.line(
             || json!({ "pairs": pairs, "models": models, "link": link_as_json(tally) }),
@@ -327,7 +351,7 @@ fn merge(into: &mut Value, from: Value) {
 }
 
 fn described(told: &Value, model: &Model, warnings: &[String], folder: &Path) -> String {
-    let (pair, size, folder) = (&told["pair"], sides(model.size()), folder.display());
+    let (pair, size, folder) = (&told["pair"], sides(model.size), folder.display());
     let mut text = format!("pair {pair}: {size}: {folder}");
     for warning in warnings {
         text.push_str(&format!("\n  warning: {warning}"));
