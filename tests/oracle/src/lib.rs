@@ -6,6 +6,8 @@ pub mod cases;
 pub mod core;
 pub mod device;
 pub mod graph;
+pub mod images;
+pub mod kernels;
 pub mod link;
 pub mod matching;
 pub mod mesh_checker;
