@@ -14,8 +14,11 @@ use ndshape::{ConstShape, ConstShape3u32};
 use oracle::images::{self, Image};
 use oracle::kernels::{self, Entry, Kernel};
 use serde_json::{Value, json};
-use std::io::{self, BufRead, Write};
+use std::io::{self, Write};
 use std::time::{Duration, Instant};
+
+/// The one kernel here that is not ours.
+const SURFACE_NETS: &str = "surface_nets";
 
 /// A grid of 128 cells along the unit cube.
 type Grid = ConstShape3u32<128, 128, 128>;
@@ -81,8 +84,9 @@ impl Ready {
         }
         let known = self.kernels.iter().position(|(known, _)| known == name);
         let at = known.unwrap_or_else(|| {
-            let ours = entries.iter().find(|entry| entry.name == name).map(|entry| entry.on(image));
-            let kernel = ours.unwrap_or_else(|| Box::new(SurfaceNets::new()));
+            let ours = || entries.iter().find(|entry| entry.name == name).expect("a known kernel");
+            let kernel =
+                if name == SURFACE_NETS { Box::new(SurfaceNets::new()) } else { ours().on(image) };
             self.kernels.push((name.to_owned(), kernel));
             self.kernels.len() - 1
         });
@@ -122,7 +126,7 @@ fn main() -> io::Result<()> {
         match words[..] {
             ["kernels"] => {
                 let mut names: Vec<_> = entries.iter().map(|entry| &*entry.name).collect();
-                names.push("surface_nets");
+                names.push(SURFACE_NETS);
                 answer(json!({ "names": names }), &[])?;
             }
             ["images"] => {
