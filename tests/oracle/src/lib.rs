@@ -5,6 +5,7 @@ pub mod camera;
 pub mod cases;
 pub mod core;
 pub mod device;
+pub mod emulated;
 pub mod graph;
 pub mod images;
 pub mod kernels;
