@@ -10,7 +10,10 @@ fn bench(criterion: &mut Criterion) {
     let images = images::all();
     for entry in kernels::all().iter().filter(|entry| entry.scope == Scope::Kernel) {
         let mut group = criterion.benchmark_group(&entry.name);
-        group.sample_size(20).warm_up_time(Duration::from_millis(100)).measurement_time(Duration::from_millis(400));
+        group
+            .sample_size(20)
+            .warm_up_time(Duration::from_millis(100))
+            .measurement_time(Duration::from_millis(400));
         for image in &images {
             group.bench_function(&image.name, |bencher| {
                 let mut kernel = entry.on(image);

@@ -10,7 +10,10 @@ fn bench(criterion: &mut Criterion) {
     let images = images::all();
     for entry in kernels::all().iter().filter(|entry| entry.scope != Scope::Kernel) {
         let mut group = criterion.benchmark_group(&entry.name);
-        group.sample_size(10).warm_up_time(Duration::from_millis(100)).measurement_time(Duration::from_secs(1));
+        group
+            .sample_size(10)
+            .warm_up_time(Duration::from_millis(100))
+            .measurement_time(Duration::from_secs(1));
         let enough = if entry.scope == Scope::Alone { &images[..1] } else { &images };
         for image in enough {
             group.bench_function(&image.name, |bencher| {

@@ -85,8 +85,7 @@ impl Ready {
         let known = self.kernels.iter().position(|(known, _)| known == name);
         let at = known.unwrap_or_else(|| {
             let ours = || entries.iter().find(|entry| entry.name == name).expect("a known kernel");
-            let kernel =
-                if name == SURFACE_NETS { Box::new(SurfaceNets::new()) } else { ours().on(image) };
+            let kernel = if name == SURFACE_NETS { Box::new(SurfaceNets::new()) } else { ours().on(image) };
             self.kernels.push((name.to_owned(), kernel));
             self.kernels.len() - 1
         });

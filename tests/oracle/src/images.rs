@@ -215,7 +215,5 @@ fn blobs() -> Outline {
             discs.push(next);
         }
     }
-    Box::new(move |x, y| {
-        discs.iter().map(|[u, v, r]| (x - u).hypot(y - v) - r).fold(f64::INFINITY, f64::min)
-    })
+    Box::new(move |x, y| discs.iter().map(|[u, v, r]| (x - u).hypot(y - v) - r).fold(f64::INFINITY, f64::min))
 }

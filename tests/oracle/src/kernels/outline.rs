@@ -78,8 +78,8 @@ fn rows(image: &Image) -> Box<dyn Kernel> {
         move |memory, outcome| {
             let [left, right] = &memory.eyes;
             let mut scratch = Arena::new(memory.scratch);
-            let [left_rows, right_rows]: [Rows<'_>; 2] = [(left, 0), (right, outcome.vertical_offset)]
-                .map(|(eye, offset)| {
+            let [left_rows, right_rows]: [Rows<'_>; 2] =
+                [(left, 0), (right, outcome.vertical_offset)].map(|(eye, offset)| {
                     let count = count_crossings(eye.contour, eye.loops, offset, height);
                     let first = scratch.take(height + 1, "ends of rows").unwrap();
                     let crossings = scratch.take(count, "row crossings").unwrap();

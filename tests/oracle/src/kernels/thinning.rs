@@ -19,8 +19,7 @@ pub(super) fn entries() -> Vec<Entry> {
         for (variant, kernels) in VARIANTS {
             if let Some(kernels) = kernels() {
                 let name = format!("{name}/{variant}");
-                entries
-                    .push(Entry::new(&name, Scope::Kernel, move |image| by_layers(image, rule, &kernels)));
+                entries.push(Entry::new(&name, Scope::Kernel, move |image| by_layers(image, rule, &kernels)));
             }
         }
     }
