@@ -11,7 +11,7 @@ use oracle::images::{Image, grey};
 use oracle::kernels;
 use plotters::prelude::*;
 use shared::bitmap::Bitmap;
-use shared::pipeline::Settings;
+use shared::pipeline::{EyeMemory, Settings};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
@@ -95,13 +95,23 @@ fn best_times(image: &Image) -> Times {
     best
 }
 
-/// Length of the left object's contour, in points of about a pixel.
-fn contour_length(image: &Image) -> f64 {
+/// A number of what the core leaves of a pair.
+fn described(image: &Image, count: fn(&EyeMemory<'_>) -> usize) -> f64 {
     let mut storage = Storage::new(image.size().width, image.size().height).unwrap();
     let mut memory = storage.lend();
     let pair = image.pair.each_ref().map(grey);
     firmware::stages::run(&mut memory, pair, &Settings::new(image.optics), &mut ()).unwrap();
-    memory.eyes[0].contour.len() as f64
+    count(&memory.eyes[0]) as f64
+}
+
+/// Length of the left object's contour, in points of about a pixel.
+fn contour_length(image: &Image) -> f64 {
+    described(image, |eye| eye.contour.len())
+}
+
+/// Branches of its skeleton.
+fn branches(image: &Image) -> f64 {
+    described(image, |eye| eye.branches.len())
 }
 
 /// Pixels of the box of the left object.
@@ -262,7 +272,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let sizes = SIZES.into_iter().map(|(width, height)| Image::drawn("limbs", width, height));
     let by_size = experiment("pixels of the object's box", sizes, box_pixels);
     let by_length = experiment("points of the contour", WAVES.into_iter().map(waves), contour_length);
-    experiment("points of the contour", TEETH.into_iter().map(comb), contour_length);
+    experiment("branches", TEETH.into_iter().map(comb), branches);
     pairs();
     if let Some(path) = std::env::args().nth(1) {
         plot(&path, &by_size, &by_length)?;

@@ -106,7 +106,8 @@ fn held_against_the_pc(machine: &str) {
         let found: Vec<_> = found.iter().map(|(line, _)| line).collect();
         let name = format!("{} {}", case.name, case.way());
         assert!(found.iter().copied().eq(expected), "{machine}, {name}: {found:#?} is not {expected:#?}");
-        assert!(found.len() > 15 || case.name.starts_with("case"), "{name}: {found:?}");
+        let may_refuse = case.name.starts_with("case") || case.pair[0].width() < 320;
+        assert!(found.len() > 15 || may_refuse, "{name}: {found:?}");
     }
     println!("{machine}: {} cases", cases.len());
     print_costs(cases, &found);

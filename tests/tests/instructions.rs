@@ -106,7 +106,8 @@ fn print_totals(cases: &[Case], counts: &Counts) {
             goal.map_or(String::new(), said)
         };
         for (name, count) in &pairs {
-            println!("| {name} | {} | |", count / 1000);
+            let described = counts.contains_key(&(name.clone(), "pair-curves".to_owned()));
+            println!("| {name}{} | {} | |", if described { "" } else { " (refused)" }, count / 1000);
         }
         let (median, worst) = (pairs[pairs.len() / 2].1, pairs[pairs.len() - 1].1);
         println!("| {way}: median | {} | {} |", median / 1000, goal(median, goals[0]));
