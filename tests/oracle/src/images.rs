@@ -161,7 +161,7 @@ pub fn unpack(size: Size, words: &[Word], bytes: &mut [u8]) {
         for (pixels, &word) in row.chunks_mut(WORD_BITS).zip(words).filter(|(_, word)| **word != 0) {
             for (pixels, byte) in pixels.chunks_mut(8).zip(word.to_le_bytes()) {
                 // Bit k of the byte alone in byte k, then 255 wherever there is one.
-                let apart = u64::from(byte) * ONES & 0x8040_2010_0804_0201;
+                let apart = (u64::from(byte) * ONES) & 0x8040_2010_0804_0201;
                 let set = (apart + 0x7f * ONES) >> 7 & ONES;
                 pixels.copy_from_slice(&(set * 255).to_le_bytes()[..pixels.len()]);
             }

@@ -7,7 +7,6 @@ mod raster;
 mod thinning;
 mod whole;
 
-pub use thinning::VARIANTS;
 pub use whole::balls;
 
 use crate::images::Image;

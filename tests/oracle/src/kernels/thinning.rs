@@ -8,8 +8,11 @@ use shared::pipeline::Kernels;
 use shared::stage::distance::{Parabola, distance, scratch_parabolas};
 use shared::stage::thinning::{Rule, scratch_order, thin};
 
-/// The ways in which this machine can run the parallel rules, none where it lacks the instructions.
-pub const VARIANTS: [(&str, fn() -> Option<Kernels>); 1] = [("u64", || Some(Kernels::PORTABLE))];
+/// A way to run the parallel rules: its name, and its functions where the machine has the instructions.
+type Variant = (&'static str, fn() -> Option<Kernels>);
+
+/// All of them.
+const VARIANTS: [Variant; 1] = [("u64", || Some(Kernels::PORTABLE))];
 
 pub(super) fn entries() -> Vec<Entry> {
     let mut entries = Vec::new();
