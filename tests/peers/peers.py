@@ -274,8 +274,11 @@ def markdown(lines):
 
 
 def progress(text):
+    """Where the run is: one line that changes, or, where that is kept, one after the other."""
     if sys.stderr.isatty():
         print(f"\r\033[K{text}", end="", file=sys.stderr, flush=True)
+    elif text:
+        print(text, file=sys.stderr, flush=True)
 
 
 def main():
