@@ -40,8 +40,13 @@ pub fn pack<'w>(size: Size, bytes: &[u8], words: &'w mut [Word]) -> Result<Bitma
 pub fn unpack(bitmap: &Bitmap<'_>, bytes: &mut [u8]) -> Result<(), CapacityError> {
     let (size, limit) = (bitmap.size(), bytes.len());
     let bytes = bytes.get_mut(..size.pixels()).ok_or(CapacityError { what: "bytes of a mask", limit })?;
+    // Words without a pixel, most of a skeleton's, cost nothing but their zeros.
+    bytes.fill(0);
     for (v, row) in bytes.chunks_exact_mut(size.width.max(1)).enumerate() {
         for (word, pixels) in bitmap.row(v as i32).iter().zip(row.chunks_mut(WORD_BITS)) {
+            if *word == 0 {
+                continue;
+            }
             let (eights, rest) = pixels.as_chunks_mut();
             for (eight, byte) in eights.iter_mut().zip(word.to_le_bytes()) {
                 *eight = unpacked(byte);
