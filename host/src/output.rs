@@ -34,15 +34,14 @@ pub(crate) const PICTURES: &str = "pictures";
 /// [`ExportError`] with the file or folder that could not be written.
 pub fn write(folder: &Path, run: &Run<'_>) -> Result<Vec<u8>, ExportError> {
     let created = create(folder)?;
-    let report = numbers::json(run);
-    let result = write_into(folder, run, &report);
+    let result = write_into(folder, run);
     if result.is_err() {
         for folder in created.iter().rev() {
             // What still holds files stays: then it is no longer ours alone.
             let _ = std::fs::remove_dir(folder);
         }
     }
-    result.map(|()| report)
+    result
 }
 
 /// Whether a folder holds what a run left.
@@ -90,14 +89,16 @@ fn failed(path: &Path, source: io::Error) -> ExportError {
     ExportError::Io { path: path.to_path_buf(), source }
 }
 
-fn write_into(folder: &Path, run: &Run<'_>, report: &[u8]) -> Result<(), ExportError> {
+fn write_into(folder: &Path, run: &Run<'_>) -> Result<Vec<u8>, ExportError> {
     let staged = tempfile::Builder::new()
         .prefix(".unfinished-")
         .tempdir_in(folder)
         .map_err(|source| failed(folder, source))?;
     let stage = Stage { folder, staged: staged.path() };
     let mut names = stage.models(run.reconstruction)?;
-    names.push(stage.bytes("report.json", report)?);
+    // Only a mesh that could be written is sound enough to be measured.
+    let report = numbers::json(run);
+    names.push(stage.bytes("report.json", &report)?);
     let drawn = pictures::draw(run);
     if !drawn.is_empty() {
         let pictures = stage.staged.join(PICTURES);
@@ -106,7 +107,8 @@ fn write_into(folder: &Path, run: &Run<'_>, report: &[u8]) -> Result<(), ExportE
     let pictures =
         drawn.par_iter().map(|(name, picture)| stage.picture(&format!("{PICTURES}/{name}"), picture));
     names.extend(pictures.collect::<Result<Vec<_>, _>>()?);
-    stage.finish(&names)
+    stage.finish(&names)?;
+    Ok(report)
 }
 
 /// Files on their way into a folder.
