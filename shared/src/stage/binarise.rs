@@ -291,12 +291,13 @@ pub fn binarise_row(row: &[u8], level: u8, tone: Tone, out: &mut [Word]) {
 /// a bit of its own.
 fn above(level: u8) -> impl Fn([u8; BYTES]) -> Word + Copy {
     const ONES: Word = Word::MAX / 255;
-    const GATHER: Word = Word::MAX / 127 >> BYTES;
+    const LOWER: Word = ONES * 0x7F;
+    const GATHER: Word = (Word::MAX / 127) >> BYTES;
     let lacking = Word::from(u8::MAX - level) * ONES;
     move |values| {
         let values = Word::from_le_bytes(values);
-        let half_sum = (values & lacking) + ((values ^ lacking) >> 1 & ONES * 0x7F);
-        (half_sum & ONES * 0x80).wrapping_mul(GATHER) & !(Word::MAX >> BYTES)
+        let half_sum = (values & lacking) + ((values ^ lacking) >> 1 & LOWER);
+        (half_sum & !LOWER).wrapping_mul(GATHER) & !(Word::MAX >> BYTES)
     }
 }
 

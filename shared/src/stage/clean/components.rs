@@ -112,9 +112,9 @@ fn find_runs(bitmap: &Bitmap<'_>, (v, whole): (usize, bool), ground: Ground, run
             let bit = other.trailing_zeros();
             let u = i * WORD_BITS + bit as usize;
             if within == 0 {
-                start = u
+                start = u;
             } else {
-                add(start, u)
+                add(start, u);
             }
             within = !within;
             other = !other & Word::MAX << bit;
