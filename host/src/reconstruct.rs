@@ -25,13 +25,11 @@ use crate::stage::rectify::{RectifiedCamera, RectifyError};
 use crate::stage::surface::SurfaceError;
 use grow::Growth;
 use image::GrayImage;
-use nalgebra::Point3;
 use options::core_settings;
 use shared::bitmap::{Grey, Size};
 use shared::camera::PairModel;
 use shared::pipeline::{Finding, Memory, Observer, Outcome};
 use std::time::{Duration, Instant};
-
 
 /// What became of a pair.
 #[derive(Clone, Debug)]

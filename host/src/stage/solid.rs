@@ -178,7 +178,7 @@ mod tests {
                 // Some radii coincide.
                 let radius = 5.0
                     + (4.0 * random.uniform()).floor()
-                    + if place % 2 == 0 { random.normal() } else { 0.0 };
+                    + if place.is_multiple_of(2) { random.normal() } else { 0.0 };
                 SolidBall { centre: walk, radius, at: walk.coords.xy(), place }
             };
             let balls: Vec<SolidBall> = (0..count).map(&mut ball).collect();

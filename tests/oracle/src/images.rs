@@ -12,7 +12,8 @@ use host::render::Noise;
 use host::stage::rectify::Rectification;
 use image::{GrayImage, Luma};
 use shared::arena::Arena;
-use shared::bitmap::{Bitmap, Grey, Size, WORD_BITS, Word};
+use shared::bitmap::{Bitmap, Grey, Size, Word};
+use shared::pack::unpack;
 use shared::pipeline::{Run, Settings, Side};
 use shared::stage::depth::Optics;
 

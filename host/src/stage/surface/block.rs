@@ -194,8 +194,8 @@ impl Grove {
                 }
             }
         }
-        for kind in 0..2 {
-            self.moved.extend(bits(block.moved[kind]).map(|bit| moved[kind][bit]));
+        for (set, places) in block.moved.iter().zip(&moved) {
+            self.moved.extend(bits(*set).map(|bit| places[bit]));
         }
         self.blocks.push(block);
     }

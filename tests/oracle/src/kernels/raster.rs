@@ -2,6 +2,7 @@
 
 use super::{Entry, Kernel, Scope, shown, step};
 use crate::images::{Image, grey};
+use shared::arena::Arena;
 use shared::bitmap::{Bitmap, Size, Word};
 use shared::limits::MAX_SIDE;
 use shared::pack::unpack;
@@ -88,8 +89,8 @@ fn clean(image: &Image) -> Box<dyn Kernel> {
         move |(words, scratch)| {
             words.copy_from_slice(&dirty);
             let mut mask = Bitmap::over(size, words).unwrap();
-            clean::keep_largest(&mut mask, scratch).unwrap();
-            clean::fill_holes(&mut mask, clean::HOLE_AREA, scratch).unwrap();
+            clean::keep_largest(&mut mask, Arena::new(scratch)).unwrap();
+            clean::fill_holes(&mut mask, clean::HOLE_AREA, Arena::new(scratch)).unwrap();
         },
         move |(words, _)| bytes(size, words),
     )

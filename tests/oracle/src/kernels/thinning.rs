@@ -19,8 +19,11 @@ fn widths() -> impl Iterator<Item = (String, Thin)> {
 
 pub(super) fn entries() -> Vec<Entry> {
     let mut entries = Vec::new();
-    let rules =
-        [("zhang_suen", Parallel::ZhangSuen), ("guo_hall", Parallel::GuoHall), ("hit_or_miss", Parallel::HitOrMiss)];
+    let rules = [
+        ("zhang_suen", Parallel::ZhangSuen),
+        ("guo_hall", Parallel::GuoHall),
+        ("hit_or_miss", Parallel::HitOrMiss),
+    ];
     for (name, rule) in rules {
         for (width, thin) in widths() {
             let name = format!("{name}/{width}");
