@@ -23,11 +23,11 @@ pub fn pack<'w>(size: Size, bytes: &[u8], words: &'w mut [Word]) -> Result<Bitma
     let mut bitmap = Bitmap::over(size, words)?;
     for (v, row) in bytes.chunks_exact(size.width.max(1)).enumerate() {
         for (word, pixels) in bitmap.row_mut(v as i32).iter_mut().zip(row.chunks(WORD_BITS)) {
-            let (eights, rest) = pixels.as_chunks();
-            let mut last = [0; 8];
-            last[..rest.len()].copy_from_slice(rest);
-            let all = eights.iter().chain([&last]).take(WORD_BITS / 8).enumerate();
-            *word = all.fold(0, |word, (k, eight)| word | Word::from(packed(*eight)) << (8 * k));
+            let mut whole = [0; WORD_BITS];
+            *word = packed(pixels.try_into().unwrap_or_else(|_| {
+                whole[..pixels.len()].copy_from_slice(pixels);
+                &whole
+            }));
         }
     }
     Ok(bitmap)
@@ -60,8 +60,22 @@ pub fn unpack(bitmap: &Bitmap<'_>, bytes: &mut [u8]) -> Result<(), CapacityError
 }
 
 /// Bit `k` for each byte `k` that is not 0.
-fn packed(bytes: [u8; 8]) -> u8 {
-    let bytes = u64::from_le_bytes(bytes);
+fn packed(bytes: &[u8; WORD_BITS]) -> Word {
+    let (eights, _) = bytes.as_chunks();
+    let mut words = [0; WORD_BITS / 8];
+    for (word, eight) in words.iter_mut().zip(eights) {
+        *word = u64::from_le_bytes(*eight);
+    }
+    // Most words have pixels of one kind.
+    match words.iter().fold((0, u64::MAX), |(any, all), word| (any | word, all & word)) {
+        (0, _) => 0,
+        (_, u64::MAX) => Word::MAX,
+        _ => words.iter().rev().fold(0, |word, eight| word << 8 | Word::from(packed_eight(*eight))),
+    }
+}
+
+/// Bit `k` for each byte `k` that is not 0.
+fn packed_eight(bytes: u64) -> u8 {
     // The high bit of each byte that is not 0, moved to its lowest; the product gathers them in the top byte.
     let set = (((bytes & LOW) + LOW) | bytes) >> 7 & ONES;
     (set.wrapping_mul(0x0102_0408_1020_4080) >> 56) as u8
@@ -83,7 +97,7 @@ mod tests {
             let expected = core::array::from_fn(|k| if bits >> k & 1 == 1 { u8::MAX } else { 0 });
             assert_eq!(unpacked(bits), expected);
             for value in [1, 127, 128, 255] {
-                assert_eq!(packed(expected.map(|byte| byte & value)), bits);
+                assert_eq!(packed_eight(u64::from_le_bytes(expected.map(|byte| byte & value))), bits);
             }
         }
     }
