@@ -42,10 +42,25 @@ mod x86 {
     use shared::limits::CapacityError;
     use shared::stage::parallel_thinning::{Parallel, Report, thin_in_lanes};
 
+    /// [`Lanes::with`].
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    fn avx2_with(words: __m256i, bits: __m256i) -> Word {
+        let none = _mm256_cmpeq_epi64(_mm256_and_si256(words, bits), _mm256_setzero_si256());
+        !_mm256_movemask_pd(_mm256_castsi256_pd(none)) as Word & 0b1111
+    }
+
+    /// [`Lanes::with`].
+    #[inline]
+    #[target_feature(enable = "avx512f")]
+    fn avx512_with(words: __m512i, bits: __m512i) -> Word {
+        _mm512_test_epi64_mask(words, bits).into()
+    }
+
     /// A register as lanes: its type, words, features, instructions, and the thinning in it.
     macro_rules! lanes {
         ($name:ident $register:ty, $words:literal, $features:literal, $thin:ident, $splat:ident, $load:ident,
-         $store:ident, $and:ident, $or:ident, $xor:ident, $shl:ident, $shr:ident) => {
+         $store:ident, $and:ident, $or:ident, $xor:ident, $shl:ident, $shr:ident, $with:ident) => {
             #[derive(Clone, Copy)]
             struct $name($register);
 
@@ -132,10 +147,9 @@ mod x86 {
                 }
 
                 #[inline(always)]
-                fn joined(self) -> Word {
-                    let mut words = [0; $words];
-                    self.store(&mut words, 0);
-                    words.into_iter().fold(0, |all, word| all | word)
+                fn with(self, bits: Word) -> Word {
+                    // SAFETY: as above.
+                    unsafe { $with(self.0, Self::splat(bits).0) }
                 }
             }
 
@@ -159,7 +173,9 @@ mod x86 {
     }
 
     lanes!(Avx2 __m256i, 4, "avx2", avx2, _mm256_set1_epi64x, _mm256_loadu_si256, _mm256_storeu_si256,
-        _mm256_and_si256, _mm256_or_si256, _mm256_xor_si256, _mm256_sll_epi64, _mm256_srl_epi64);
+        _mm256_and_si256, _mm256_or_si256, _mm256_xor_si256, _mm256_sll_epi64, _mm256_srl_epi64,
+        avx2_with);
     lanes!(Avx512 __m512i, 8, "avx512f,avx512bw,avx512vl,avx512dq", avx512, _mm512_set1_epi64, _mm512_loadu_si512,
-        _mm512_storeu_si512, _mm512_and_si512, _mm512_or_si512, _mm512_xor_si512, _mm512_sll_epi64, _mm512_srl_epi64);
+        _mm512_storeu_si512, _mm512_and_si512, _mm512_or_si512, _mm512_xor_si512, _mm512_sll_epi64, _mm512_srl_epi64,
+        avx512_with);
 }

@@ -35,8 +35,8 @@ pub trait Lanes:
     /// When there are fewer than [`Self::WORDS`].
     fn store(self, words: &mut [Word], at: usize);
 
-    /// All words, joined by or.
-    fn joined(self) -> Word;
+    /// Bit `k` for each word `k` that has one of these bits.
+    fn with(self, bits: Word) -> Word;
 }
 
 /// What every machine has.
@@ -59,7 +59,7 @@ impl Lanes for Word {
     }
 
     #[inline(always)]
-    fn joined(self) -> Word {
-        self
+    fn with(self, bits: Word) -> Word {
+        Word::from(self & bits != 0)
     }
 }

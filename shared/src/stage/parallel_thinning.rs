@@ -122,9 +122,9 @@ const PITCH: usize = WORD_BITS - 2;
 const OWN: Word = Word::MAX >> 2 << 1;
 /// Rows that are handled without looking at the marks.
 const GROUP: usize = WORD_BITS / 4;
-/// Marks of a strip, one bit a block: where a step deleted anything; anything in the first row, in the last
-/// row, in the first column and in the last column.
-const MARKS: usize = 5;
+/// Marks of a strip, one bit a block: where a step deleted anything, or in the row above or below; where it
+/// deleted anything in the first column, and in the last one.
+const MARKS: usize = 3;
 
 /// Words of scratch that the parallel rules need.
 pub const fn scratch_words(size: Size) -> usize {
@@ -240,33 +240,33 @@ impl Cut {
         let mut busy = 0;
         let strips = now.chunks_exact(self.stride()).zip(next.chunks_exact_mut(self.stride()));
         for (((now, next), due), found) in strips.zip(due).zip(found.as_chunks_mut::<MARKS>().0) {
-            *found = [0; MARKS];
+            let mut marks = [0; MARKS];
             for block in SetBits(core::mem::take(due)) {
                 let (from, rows) = (block * self.block(), self.block());
                 let (now, next) = (&now[from..from + rows + 2], &mut next[from + 1..from + 1 + rows]);
-                let all = delete::<L, S>(now, next);
-                let (first, last) = (now[1] ^ next[0], now[rows] ^ next[rows - 1]);
-                let marks = [all, first, last, all & 1 << 1, all & 1 << PITCH];
-                for (found, mark) in found.iter_mut().zip(marks) {
-                    *found |= Word::from(mark != 0) << block;
-                }
+                let [first, here, last, west, east] = delete::<L, S>(now, next);
+                marks[0] |= first << block >> 1 | here << block | last << block << 1;
+                marks[1] |= west << block;
+                marks[2] |= east << block;
             }
-            busy |= found[0];
+            *found = marks;
+            busy |= marks[0];
         }
         busy != 0
     }
 
     /// After a step: the blocks at which later steps have to look, and the strips' copies of what was deleted
     /// beside them.
+    #[inline(always)]
     fn spread(&self, rows: &mut [Word], due: &mut [Word], found: &[Word], steps: usize) {
         let all = self.all_blocks();
-        for (c, &[here, first, last, west, east]) in found.as_chunks::<MARKS>().0.iter().enumerate() {
-            if here == 0 {
+        for (c, &[near, west, east]) in found.as_chunks::<MARKS>().0.iter().enumerate() {
+            if near == 0 {
                 continue;
             }
             let beside = |marks: Word| (marks | marks >> 1 | marks << 1) & all;
             for due in due.chunks_exact_mut(self.count).take(steps) {
-                due[c] |= (here | first >> 1 | last << 1) & all;
+                due[c] |= near & all;
                 if west != 0 && c > 0 {
                     due[c - 1] |= beside(west);
                 }
@@ -274,38 +274,61 @@ impl Cut {
                     due[c + 1] |= beside(east);
                 }
             }
-            self.copy(rows, c, west, c.wrapping_sub(1), |own| own << PITCH | !(1 << (WORD_BITS - 1)));
-            self.copy(rows, c, east, c + 1, |own| own >> PITCH | !1);
+            if c > 0 {
+                let [to, from] = self.strips(rows, c - 1);
+                self.copy(from, west, to, |own| own << PITCH | !(1 << (WORD_BITS - 1)));
+            }
+            if c + 1 < self.count {
+                let [from, to] = self.strips(rows, c);
+                self.copy(from, east, to, |own| own >> PITCH | !1);
+            }
         }
     }
 
+    /// A strip and the one after it.
+    #[inline(always)]
+    fn strips<'r>(&self, rows: &'r mut [Word], c: usize) -> [&'r mut [Word]; 2] {
+        let (one, other) = rows[c * self.stride()..(c + 2) * self.stride()].split_at_mut(self.stride());
+        [one, other]
+    }
+
     /// Clear in strip `to` what is clear in the marked blocks of strip `from`, of which `seen` makes a mask.
-    fn copy(&self, rows: &mut [Word], from: usize, marks: Word, to: usize, seen: impl Fn(Word) -> Word) {
-        if to < self.count {
-            for block in SetBits(marks) {
-                for v in 1 + block * self.block()..1 + (block + 1) * self.block() {
-                    rows[to * self.stride() + v] &= seen(rows[from * self.stride() + v]);
-                }
+    #[inline(always)]
+    fn copy(&self, from: &[Word], marks: Word, to: &mut [Word], seen: impl Fn(Word) -> Word) {
+        for block in SetBits(marks) {
+            let rows = 1 + block * self.block()..1 + (block + 1) * self.block();
+            for (to, from) in to[rows.clone()].iter_mut().zip(&from[rows]) {
+                *to &= seen(*from);
             }
         }
     }
 }
 
-/// The rows `now` but the first and the last, without what a step finds there; all that it found, joined.
+/// The rows `now` but the first and the last, without what a step finds there; and whether (0 or 1) it found
+/// anything in the first row, anywhere, in the last row, in the first column and in the last one.
 #[inline(always)]
-fn delete<L: Lanes, S: Step>(now: &[Word], next: &mut [Word]) -> Word {
-    let rows = next.len();
-    let [above, here, below] = [0, 1, 2].map(|down| &now[down..down + rows]);
-    let (own, mut all) = (L::splat(OWN), L::splat(0));
-    let mut v = 0;
-    while v < rows {
-        let (n, c, s) = (L::load(above, v), L::load(here, v), L::load(below, v));
-        let found = c & own & S::finds([n, n >> 1, c >> 1, s >> 1, s, s << 1, c << 1, n << 1]);
-        (c & !found).store(next, v);
-        all = all | found;
+fn delete<L: Lanes, S: Step>(now: &[Word], next: &mut [Word]) -> [Word; 5] {
+    let first = delete_at::<L, S>(now, next, 0);
+    let [mut all, mut last] = [first; 2];
+    let mut v = L::WORDS;
+    while v < next.len() {
+        last = delete_at::<L, S>(now, next, v);
+        all = all | last;
         v += L::WORDS;
     }
-    all.joined()
+    let (first, last) = (first.with(Word::MAX) & 1, last.with(Word::MAX) >> (L::WORDS - 1));
+    let [here, west, east] =
+        [all.with(Word::MAX), all.with(1 << 1), all.with(1 << PITCH)].map(|with| with.min(1));
+    [first, here, last, west, east]
+}
+
+/// [`delete`] in the rows of one register, `v` of `next` and those after it: what was found.
+#[inline(always)]
+fn delete_at<L: Lanes, S: Step>(now: &[Word], next: &mut [Word], v: usize) -> L {
+    let (n, c, s) = (L::load(now, v), L::load(now, v + 1), L::load(now, v + 2));
+    let found = c & L::splat(OWN) & S::finds([n, n >> 1, c >> 1, s >> 1, s, s << 1, c << 1, n << 1]);
+    (c & !found).store(next, v);
+    found
 }
 
 /// One step of a rule.
