@@ -8,8 +8,8 @@
 use nalgebra::Point3;
 
 use super::{
-    block::{Block, Grove, bits},
-    lattice::{EDGES, ENDS, Edge, TETRAHEDRA, cube_ahead, seen_ahead},
+    block::{Block, Grove, bits, leaf_at},
+    lattice::{Corner, EDGES, ENDS, Edge, TETRAHEDRA, cube_ahead, seen_ahead},
     region::Solid,
 };
 
@@ -99,17 +99,9 @@ impl Cut {
         let mut vertices = vertices.iter_mut();
         for (direction, &edges) in self.edges.iter().enumerate() {
             for bit in bits(edges) {
-                let ends = ENDS[direction].map(|corner| {
-                    let (ahead, bit) = cube_ahead(bit, corner.ahead);
-                    let (grove, block) = blocks[ahead].expect("no edge is cut to where there is no block");
-                    (block.inside[corner.kind] >> bit & 1, grove, block, corner.kind, bit)
-                });
-                let [from, to] = if ends[0].0 == 1 { ends } else { [ends[1], ends[0]] };
-                let [start, end] =
-                    [from, to].map(|(_, grove, block, kind, bit)| grove.position(solid, block, kind, bit));
-                let cone = from.2.cone(from.3, from.4);
-                *vertices.next().expect("a place for each vertex") =
-                    crossing(solid, blocks, [start, end], cone);
+                let ends = ENDS[direction].map(|corner| End::of(blocks, corner, bit));
+                let [from, to] = if ends[0].inside { ends } else { [ends[1], ends[0]] };
+                *vertices.next().expect("a place for each vertex") = crossing(solid, blocks, from, to);
             }
         }
     }
@@ -154,21 +146,56 @@ fn split([p, q, r, s]: [u32; 4], vertices: &[Point3<f64>]) -> [[u32; 3]; 2] {
     if apart(p, r) <= apart(q, s) { [[p, q, r], [p, r, s]] } else { [[p, q, s], [q, r, s]] }
 }
 
+/// An end of an edge.
+#[derive(Clone, Copy)]
+struct End<'a> {
+    grove: &'a Grove,
+    block: &'a Block,
+    kind: usize,
+    bit: usize,
+    inside: bool,
+    /// The block ahead, and the leaf of it.
+    leaf: (usize, usize),
+}
+
+impl<'a> End<'a> {
+    /// The corner of the cube at `bit` of the first of the blocks.
+    fn of(blocks: &Blocks<'a>, Corner { kind, ahead }: Corner, bit: usize) -> Self {
+        let (ahead, bit) = cube_ahead(bit, ahead);
+        let (grove, block) = blocks[ahead].expect("no edge is cut to where there is no block");
+        let inside = block.inside[kind] >> bit & 1 == 1;
+        Self { grove, block, kind, bit, inside, leaf: (ahead, leaf_at(bit)) }
+    }
+
+    fn position(&self, solid: &Solid) -> Point3<f64> {
+        self.grove.position(solid, self.block, self.kind, self.bit)
+    }
+}
+
 /// Where the edge from a point inside to one outside first leaves the solid.
 ///
 /// It leaves the cone that decides at its start; where it does, another may contain it, of which it is
-/// followed to its end, until none does.
-fn crossing(solid: &Solid, blocks: &Blocks, [from, to]: [Point3<f64>; 2], mut cone: u32) -> Point3<f64> {
+/// followed to its end, until none does. None can where an end of the edge knows that all others are further.
+fn crossing(solid: &Solid, blocks: &Blocks, start: End, end: End) -> Point3<f64> {
+    let [from, to] = [start, end].map(|end| end.position(solid));
+    let mut cone = start.block.cone(start.kind, start.bit);
     let step = to - from;
+    let square = step.norm_squared() / (solid.lattice.cube * solid.lattice.cube);
     let mut share = 0.0;
     for _ in 0..MAX_STEPS {
         let Some(exit) = solid.distances[cone as usize].exit(&from, &step) else { break };
         share = exit;
         let p = from + step * share;
-        let (ahead, leaf) = blocks[0].expect("a block").1.leaf_of(solid.lattice, &p);
-        let Some((grove, block)) = blocks.get(ahead).copied().flatten() else { break };
+        let leaf = blocks[0].expect("a block").1.leaf_of(solid.lattice, &p);
+        let alone = |end: End, share: f64| {
+            end.leaf == leaf && end.block.alone(cone, end.kind, end.bit, share * share * square)
+        };
+        if alone(start, share) || alone(end, 1.0 - share) {
+            break;
+        }
+        let Some((grove, block)) = blocks.get(leaf.0).copied().flatten() else { break };
         let exact = EXACT * solid.lattice.cube;
-        let Some(deeper) = grove.deepest_but(cone, solid, (block, leaf), (&p, exact)) else { break };
+        let Some(deeper) = grove.deepest_but(cone, solid, (block, leaf.1), (&p, exact)) else { break };
         cone = deeper;
     }
     from + step * share.clamp(END, 1.0 - END)
