@@ -259,7 +259,7 @@ impl Block {
 
     /// The block ahead, as in [`super::lattice::seen_ahead`], and the leaf of it in which `p` is.
     pub(super) fn leaf_of(&self, lattice: &Lattice, p: &Point3<f64>) -> (usize, usize) {
-        let from_corner = (p - lattice.position(self.corner)) / lattice.cube;
+        let from_corner = (p - lattice.position(self.corner)) * (1.0 / lattice.cube);
         let leaf = |axis: usize| ((from_corner[axis] + LOWERED).max(0.0) / f64::from(LEAF)) as usize;
         let [x, y, z] = [leaf(0), leaf(1), leaf(2)];
         ((x >> 1) << 2 | (y >> 1) << 1 | z >> 1, (x & 1) << 2 | (y & 1) << 1 | z & 1)
