@@ -370,6 +370,12 @@ pub(super) mod tests {
                     assert_eq!(block.inside[kind] >> bit & 1 == 1, least < 0.0, "{p}");
                     let own = far(&solid.distances[block.cone(kind, bit) as usize]);
                     assert!(least > 0.0 || own < 0.0, "{p} {own} {least}");
+                    let leaf = &block.leaves[leaf_at(bit)];
+                    for &cone in &grove.cones[leaf.first_cone as usize..][..leaf.cones as usize] {
+                        let other = far(&solid.distances[cone as usize]) / solid.lattice.cube;
+                        let known = f64::from(block.others[64 * kind + bit]);
+                        assert!(cone == block.cone(kind, bit) || known <= other, "{p} {known} {other}");
+                    }
                     let way = (p - solid.lattice.position(point_of(block.corner, bit, kind))).norm();
                     assert!(way <= MAX_SHIFT * solid.lattice.cube * (1.0 + 1e-9), "{way}");
                     if way > 0.0 {
