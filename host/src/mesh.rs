@@ -53,6 +53,15 @@ impl Mesh {
         (0..self.faces.len()).map(|face| self.volume_under(face)).sum()
     }
 
+    /// The volume that a closed mesh bounds, mm³, as [`Mesh::volume`], and the area of its surface, mm², in
+    /// one pass.
+    #[must_use]
+    pub fn volume_and_area(&self) -> (f64, f64) {
+        (0..self.faces.len()).fold((-0.0, -0.0), |(volume, area), face| {
+            (volume + self.volume_under(face), area + self.area_normal(face).norm() / 2.0)
+        })
+    }
+
     /// The part of the volume between face `face` and the first vertex, mm³, signed. Measured from a
     /// vertex and not from the camera, a far-off mesh loses no digits.
     fn volume_under(&self, face: usize) -> f64 {
@@ -77,6 +86,7 @@ mod tests {
     fn measures_a_tetrahedron() {
         let mesh = tetrahedron();
         assert_eq!(mesh.volume(), 1.0);
+        assert_eq!(mesh.volume_and_area(), (1.0, 9.0));
         assert_eq!(mesh.area_normal(0), Vector3::new(0.0, 0.0, -2.0));
         assert_eq!(mesh.bounds(), Some([Point3::new(7.0, 8.0, 9.0), Point3::new(8.0, 10.0, 12.0)]));
         let turned = Mesh { faces: mesh.faces.iter().map(|&[a, b, c]| [a, c, b]).collect(), ..mesh };

@@ -207,7 +207,9 @@ def rows():
         Row("described shape / OpenCV SGBM, 64 disparities", block_matching, "shape", at_640x480,
             {"full": 10, "device": 10}),
         Row("mesh on disk / OpenCV SGBM and reprojectImageTo3D", points_in_space, "mesh", at_640x480, {"": 1}),
-        Row("500 balls to a mesh at 128^3 / dense distances and fast-surface-nets", None, "balls_to_mesh",
+        # As true as each other, see `surface_of_balls`.
+        Row("500 balls to a mesh at 128^3 (65,858 vertices, 0.076 cells rms off) / dense distances and "
+            "fast-surface-nets (69,176 vertices, 0.077 cells rms off)", None, "balls_to_mesh",
             lambda name: name == "ring 640x480", {"": 4}),
     ], thebe
 

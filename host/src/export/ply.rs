@@ -15,6 +15,9 @@ use super::{ExportError, write_whole};
 use crate::curves::Curves;
 use crate::mesh::Mesh;
 
+/// So many vertices or faces are written at once: what stays in the cache until the system has copied it.
+const RECORDS: usize = 4096;
+
 /// Points with what is known at each, and the edges between them if they are a curve.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Points<'a> {
@@ -39,18 +42,25 @@ pub fn write_mesh(path: &Path, mesh: &Mesh, comments: &[&str]) -> Result<(), Exp
         begin(file, comments, mesh.vertices.len())?;
         writeln!(file, "element face {}", mesh.faces.len())?;
         writeln!(file, "property list uchar int vertex_indices\nend_header")?;
-        let mut records = Vec::with_capacity(mesh.vertices.len() * 12 + mesh.faces.len() * 13);
-        for vertex in &mesh.vertices {
-            records.extend_from_slice(
-                [vertex.x, vertex.y, vertex.z].map(|x| (x as f32).to_le_bytes()).as_flattened(),
-            );
+        let mut records = Vec::new();
+        for vertices in mesh.vertices.chunks(RECORDS) {
+            records.clear();
+            for vertex in vertices {
+                let record = [vertex.x, vertex.y, vertex.z].map(|x| (x as f32).to_le_bytes());
+                records.extend_from_slice(record.as_flattened());
+            }
+            file.write_all(&records)?;
         }
-        for face in &mesh.faces {
-            let mut record = [3; 13];
-            record[1..].copy_from_slice(face.map(u32::to_le_bytes).as_flattened());
-            records.extend_from_slice(&record);
+        for faces in mesh.faces.chunks(RECORDS) {
+            records.clear();
+            for face in faces {
+                let mut record = [3; 13];
+                record[1..].copy_from_slice(face.map(u32::to_le_bytes).as_flattened());
+                records.extend_from_slice(&record);
+            }
+            file.write_all(&records)?;
         }
-        file.write_all(&records)
+        Ok(())
     })
 }
 

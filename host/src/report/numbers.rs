@@ -99,6 +99,7 @@ impl Model {
         let made = run.reconstruction;
         let mesh = &made.mesh;
         let bounds = mesh.bounds();
+        let (volume_mm3, surface_area_mm2) = mesh.volume_and_area();
         let length = |[a, b]: &[u32; 2]| {
             (made.skeleton.points[*b as usize] - made.skeleton.points[*a as usize]).norm()
         };
@@ -106,8 +107,8 @@ impl Model {
         Self {
             vertices: mesh.vertices.len(),
             faces: mesh.faces.len(),
-            volume_mm3: mesh.volume(),
-            surface_area_mm2: (0..mesh.faces.len()).map(|f| mesh.area_normal(f).norm() / 2.0).sum(),
+            volume_mm3,
+            surface_area_mm2,
             lowest_mm: bounds.map(|b| b[0].into()),
             highest_mm: bounds.map(|b| b[1].into()),
             depth_mm: bounds.map(|[low, high]| (low.z + high.z) / 2.0),

@@ -48,6 +48,8 @@ pub(super) struct Block {
     leaves: [Leaf; 8],
     /// The cone that decides the distance of each point, corners first.
     cones: [u32; 128],
+    /// How far all others of its leaf are from each point at least, cubes; less than nothing if not known.
+    others: [f32; 128],
 }
 
 /// An eighth of a block.
@@ -94,6 +96,11 @@ const OFFSETS: [[[f32; LANES]; 3]; SITES / LANES] = {
 fn bit_of(leaf: usize, cube: usize) -> usize {
     let spread = |octant: usize| (octant >> 2) << 4 | (octant >> 1 & 1) << 2 | octant & 1;
     spread(leaf) << 1 | spread(cube)
+}
+
+/// The leaf of a cube of a block.
+pub(super) fn leaf_at(bit: usize) -> usize {
+    (bit >> 5) << 2 | (bit >> 3 & 1) << 1 | bit >> 1 & 1
 }
 
 impl Grove {
@@ -146,6 +153,7 @@ impl Grove {
             first_moved: self.moved.len() as u32,
             leaves: [leaf; 8],
             cones: [0; 128],
+            others: [-1.0; 128],
         };
         let mut moved = [[Point3::origin(); 64]; 2];
         for (octant, Octant { region, around }) in Octant::all(region).enumerate() {
@@ -170,7 +178,7 @@ impl Grove {
             let cones = &self.cones[first_cone..];
             prepare(cones, solid.distances, &centre, solid.lattice.cube, &mut self.groups);
             let bundle = Bundle { cones, groups: &self.groups[leaf.first_group as usize..], middle: centre };
-            let (distances, places) = bundle.nearest_of_sites(&OFFSETS);
+            let (distances, places, others) = bundle.nearest_of_sites(&OFFSETS);
             for i in 0..SITES {
                 let (kind, bit) = (i >> 3, bit_of(octant, i & 7));
                 let cone = cones[places[i]];
@@ -182,12 +190,16 @@ impl Grove {
                 if distances[i].abs() > CLEAR as f32 + blur {
                     block.inside[kind] |= u64::from(distances[i] < 0.0) << bit;
                     block.cones[64 * kind + bit] = cone;
+                    block.others[64 * kind + bit] = others[i];
                     continue;
                 }
                 let unmoved = solid.lattice.position(point_of(region.corner, bit_of(0, i & 7), kind));
                 let site = bundle.site(unmoved, solid);
                 block.inside[kind] |= u64::from(site.distance < 0.0) << bit;
                 block.cones[64 * kind + bit] = site.cone;
+                if site.cone == cone {
+                    block.others[64 * kind + bit] = others[i] - MAX_SHIFT as f32;
+                }
                 if site.position != unmoved {
                     block.moved[kind] |= 1 << bit;
                     moved[kind][bit] = site.position;
@@ -238,9 +250,16 @@ impl Block {
         self.cones[64 * kind + bit]
     }
 
+    /// Whether `cone` decides the distance of a point, and no other cone of its leaf contains any place whose
+    /// distance from the point has this square, in cubes.
+    pub(super) fn alone(&self, cone: u32, kind: usize, bit: usize, square: f64) -> bool {
+        let others = f64::from(self.others[64 * kind + bit]);
+        self.cones[64 * kind + bit] == cone && others > 0.0 && square < others * others
+    }
+
     /// The block ahead, as in [`super::lattice::seen_ahead`], and the leaf of it in which `p` is.
     pub(super) fn leaf_of(&self, lattice: &Lattice, p: &Point3<f64>) -> (usize, usize) {
-        let from_corner = (p - lattice.position(self.corner)) / lattice.cube;
+        let from_corner = (p - lattice.position(self.corner)) * (1.0 / lattice.cube);
         let leaf = |axis: usize| ((from_corner[axis] + LOWERED).max(0.0) / f64::from(LEAF)) as usize;
         let [x, y, z] = [leaf(0), leaf(1), leaf(2)];
         ((x >> 1) << 2 | (y >> 1) << 1 | z >> 1, (x & 1) << 2 | (y & 1) << 1 | z & 1)
@@ -351,6 +370,12 @@ pub(super) mod tests {
                     assert_eq!(block.inside[kind] >> bit & 1 == 1, least < 0.0, "{p}");
                     let own = far(&solid.distances[block.cone(kind, bit) as usize]);
                     assert!(least > 0.0 || own < 0.0, "{p} {own} {least}");
+                    let leaf = &block.leaves[leaf_at(bit)];
+                    for &cone in &grove.cones[leaf.first_cone as usize..][..leaf.cones as usize] {
+                        let other = far(&solid.distances[cone as usize]) / solid.lattice.cube;
+                        let known = f64::from(block.others[64 * kind + bit]);
+                        assert!(cone == block.cone(kind, bit) || known <= other, "{p} {known} {other}");
+                    }
                     let way = (p - solid.lattice.position(point_of(block.corner, bit, kind))).norm();
                     assert!(way <= MAX_SHIFT * solid.lattice.cube * (1.0 + 1e-9), "{way}");
                     if way > 0.0 {

@@ -112,13 +112,16 @@ pub(super) struct Bundle<'a> {
 }
 
 impl Bundle<'_> {
-    /// Signed distances, cubes, of points that are `offsets` cubes from the middle, and the places in the
-    /// bundle of the cones that decide them, to within rounding.
+    /// Signed distances, cubes, of points that are `offsets` cubes from the middle, the places in the bundle
+    /// of the cones that decide them, both to within rounding, and how far all other cones are at least.
     pub(super) fn nearest_of_sites(
         &self,
         offsets: &[[[f32; LANES]; 3]; SITES / LANES],
-    ) -> ([f32; SITES], [usize; SITES]) {
+    ) -> ([f32; SITES], [usize; SITES], [f32; SITES]) {
         let mut nearest = [Lanes::splat(f32::INFINITY); SITES / LANES];
+        let mut others = nearest;
+        // From the centre of the ball that decides, which is what rounding goes with.
+        let mut furthest = [Lanes::ZERO; SITES / LANES];
         // As numbers, which are exact for all that there is memory for.
         let mut places = [Lanes::ZERO; SITES / LANES];
         for (group, first) in self.groups.iter().zip((0..self.cones.len()).step_by(LANES)) {
@@ -135,21 +138,26 @@ impl Bundle<'_> {
                     let [ox, oy, oz] = offsets[i];
                     let p = plus(middle, [ox.into(), oy.into(), oz.into()]);
                     let square = dot(p, p);
-                    let distance = if low[lane] == high[lane] {
-                        square.sqrt() - wide
+                    let (far, wide) = if low[lane] == high[lane] {
+                        (square.sqrt(), wide)
                     } else {
                         let along = dot(p, axis);
                         let away = (square - along * along).fast_max(Lanes::ZERO);
                         let (square, s) = nearest_ball(along, away, extent);
-                        square.sqrt() - (wide + slope * s)
+                        (square.sqrt(), wide + slope * s)
                     };
+                    let distance = far - wide;
+                    furthest[i] = far.fast_max(furthest[i]);
+                    others[i] = distance.fast_max(nearest[i]).fast_min(others[i]);
                     places[i] = distance.simd_lt(nearest[i]).bitselect(place, places[i]);
                     nearest[i] = distance.fast_min(nearest[i]);
                 }
             }
         }
-        let mut sites = ([0.0; SITES], [0; SITES]);
+        let mut sites = ([0.0; SITES], [0; SITES], [0.0; SITES]);
         for i in 0..SITES {
+            let rounding = 8.0 * ROUNDING * (furthest[i / LANES].to_array()[i % LANES] + 4.0);
+            sites.2[i] = others[i / LANES].to_array()[i % LANES] - rounding;
             sites.0[i] = nearest[i / LANES].to_array()[i % LANES];
             sites.1[i] = places[i / LANES].to_array()[i % LANES] as usize;
         }

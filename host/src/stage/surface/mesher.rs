@@ -15,7 +15,7 @@ use super::{
     block::{EDGE, Grove, MAX_BLOCKS},
     distance::Distance,
     lattice::{Lattice, SIDE},
-    patch::{Blocks, Cut},
+    patch::{Blocks, Cut, Place},
     prune::{Answer, prune},
     region::{Level, Octant, Region, Solid},
 };
@@ -45,9 +45,6 @@ struct Seeds {
     regions: Vec<(Region, Range<usize>)>,
     cones: Vec<u32>,
 }
-
-/// Where a block is: its grove, and its place there.
-type Place = (u32, u32);
 
 impl Mesher {
     /// As [`surface`](super::surface), into `mesh`, which is emptied first.
@@ -95,10 +92,10 @@ impl Mesher {
         let wood = Wood { groves, places: &self.places };
         cuts.par_iter_mut().enumerate().for_each(|(grove, cuts)| {
             cuts.clear();
-            cuts.extend(
-                (0..wood.groves[grove].blocks.len())
-                    .map(|place| Cut::of(&wood.blocks(&wood.ahead(grove, place)))),
-            );
+            cuts.extend((0..wood.groves[grove].blocks.len()).map(|place| {
+                let ahead = wood.ahead(grove, place);
+                Cut::of(&wood.blocks(&ahead), ahead)
+            }));
         });
         let faces = number(cuts);
         if faces == 0 {
@@ -177,20 +174,19 @@ impl<'a> Wood<'a> {
         let count = |of: fn(&Cut) -> u32| cuts.iter().flatten().map(|cut| of(cut) as usize).sum();
         mesh.vertices.resize(count(|cut| cut.vertices), Point3::origin());
         spread(0, cuts, &mut mesh.vertices, |cut| cut.vertices, &|grove, mut vertices| {
-            for (place, cut) in cuts[grove].iter().enumerate() {
+            for cut in &cuts[grove] {
                 let (own, others) = vertices.split_at_mut(cut.vertices as usize);
-                cut.put_vertices(solid, &self.blocks(&self.ahead(grove, place)), own);
+                cut.put_vertices(solid, &self.blocks(&cut.ahead), own);
                 vertices = others;
             }
         });
         mesh.faces.resize(count(|cut| cut.faces), [0; 3]);
         let vertices = &mesh.vertices;
         spread(0, cuts, &mut mesh.faces, |cut| cut.faces, &|grove, mut faces| {
-            for (place, cut) in cuts[grove].iter().enumerate() {
+            for cut in &cuts[grove] {
                 let (own, others) = faces.split_at_mut(cut.faces as usize);
-                let places = self.ahead(grove, place);
-                let cuts = places.map(|place| Some(&cuts[place?.0 as usize][place?.1 as usize]));
-                Cut::put_faces(&self.blocks(&places), &cuts, vertices, own);
+                let cuts = cut.ahead.map(|place| Some(&cuts[place?.0 as usize][place?.1 as usize]));
+                Cut::put_faces(&self.blocks(&cut.ahead), &cuts, vertices, own);
                 faces = others;
             }
         });

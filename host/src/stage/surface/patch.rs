@@ -8,8 +8,8 @@
 use nalgebra::Point3;
 
 use super::{
-    block::{Block, Grove, bits},
-    lattice::{EDGES, ENDS, Edge, TETRAHEDRA, cube_ahead, seen_ahead},
+    block::{Block, Grove, bits, leaf_at},
+    lattice::{Corner, EDGES, ENDS, Edge, TETRAHEDRA, cube_ahead, seen_ahead},
     region::Solid,
 };
 
@@ -44,6 +44,9 @@ const FEWER_FIRST: [[usize; 4]; 16] = [
     [0, 1, 2, 3],
 ];
 
+/// Where a block is: its grove, and its place there.
+pub(super) type Place = (u32, u32);
+
 /// The edges of a block that the surface cuts.
 #[derive(Debug)]
 pub(super) struct Cut {
@@ -55,6 +58,8 @@ pub(super) struct Cut {
     pub(super) first_vertex: u32,
     pub(super) vertices: u32,
     pub(super) faces: u32,
+    /// The block and those ahead of it, see [`Blocks`].
+    pub(super) ahead: [Option<Place>; 8],
 }
 
 /// A block and the seven ahead of it, where there are any. What is missing is further from the surface than
@@ -71,7 +76,7 @@ fn inside(blocks: &Blocks) -> [[u64; 8]; 2] {
 
 impl Cut {
     /// What of a block is cut; its first vertex is yet to be numbered.
-    pub(super) fn of(blocks: &Blocks) -> Self {
+    pub(super) fn of(blocks: &Blocks, ahead: [Option<Place>; 8]) -> Self {
         let inside = inside(blocks);
         let edges = ENDS.map(|[a, b]| inside[a.kind][a.ahead] ^ inside[b.kind][b.ahead]);
         let (mut first, mut vertices) = ([0; EDGES], 0);
@@ -85,7 +90,7 @@ impl Cut {
             let cut = (a | b | c | d) & !(a & b & c & d);
             triangles.count_ones() + 2 * (cut & !triangles).count_ones()
         });
-        Self { edges, first, first_vertex: 0, vertices, faces: faces.sum() }
+        Self { edges, first, first_vertex: 0, vertices, faces: faces.sum(), ahead }
     }
 
     /// The number of the vertex on an edge that is cut.
@@ -99,17 +104,9 @@ impl Cut {
         let mut vertices = vertices.iter_mut();
         for (direction, &edges) in self.edges.iter().enumerate() {
             for bit in bits(edges) {
-                let ends = ENDS[direction].map(|corner| {
-                    let (ahead, bit) = cube_ahead(bit, corner.ahead);
-                    let (grove, block) = blocks[ahead].expect("no edge is cut to where there is no block");
-                    (block.inside[corner.kind] >> bit & 1, grove, block, corner.kind, bit)
-                });
-                let [from, to] = if ends[0].0 == 1 { ends } else { [ends[1], ends[0]] };
-                let [start, end] =
-                    [from, to].map(|(_, grove, block, kind, bit)| grove.position(solid, block, kind, bit));
-                let cone = from.2.cone(from.3, from.4);
-                *vertices.next().expect("a place for each vertex") =
-                    crossing(solid, blocks, [start, end], cone);
+                let ends = ENDS[direction].map(|corner| End::of(blocks, corner, bit));
+                let [from, to] = if ends[0].inside { ends } else { [ends[1], ends[0]] };
+                *vertices.next().expect("a place for each vertex") = crossing(solid, blocks, from, to);
             }
         }
     }
@@ -124,29 +121,73 @@ impl Cut {
         let inside = inside(blocks);
         let mut faces = faces.iter_mut();
         let mut put = |face| *faces.next().expect("a place for each face") = face;
-        for tetrahedron in &TETRAHEDRA {
-            let corners = tetrahedron.corners.map(|corner| inside[corner.kind][corner.ahead]);
-            let [a, b, c, d] = corners;
+        let own = cuts[0].expect("a block");
+        let mut numbers = [[0; 64]; EDGES];
+        let mut next = own.first_vertex;
+        for (numbers, &edges) in numbers.iter_mut().zip(&own.edges) {
+            for bit in bits(edges) {
+                numbers[bit] = next;
+                next += 1;
+            }
+        }
+        for (tetrahedron, rings) in TETRAHEDRA.iter().zip(&RINGS) {
+            let [a, b, c, d] = tetrahedron.corners.map(|corner| inside[corner.kind][corner.ahead]);
             for bit in bits((a | b | c | d) & !(a & b & c & d)) {
-                let set = (0..4).fold(0, |set, i| set | ((corners[i] >> bit & 1) as usize) << i);
-                let order = FEWER_FIRST[set];
-                let vertex = |i: usize, j: usize| {
-                    let Edge { direction, ahead } = tetrahedron.edges[order[i]][order[j]];
-                    let (ahead, bit) = cube_ahead(bit, ahead);
-                    cuts[ahead].expect("no edge is cut of where there is no block").vertex(direction, bit)
-                };
-                match set.count_ones() {
-                    1 => put([vertex(0, 1), vertex(0, 2), vertex(0, 3)]),
-                    2 => {
-                        let ring = [vertex(0, 2), vertex(0, 3), vertex(1, 3), vertex(1, 2)];
-                        split(ring, vertices).into_iter().for_each(&mut put);
+                let set = (a >> bit & 1) | (b >> bit & 1) << 1 | (c >> bit & 1) << 2 | (d >> bit & 1) << 3;
+                let ring = &rings[set as usize];
+                let vertex = |i: usize| {
+                    let (direction, ahead) = (usize::from(ring.edges[i][0]), usize::from(ring.edges[i][1]));
+                    match cube_ahead(bit, ahead) {
+                        (0, bit) => numbers[direction][bit],
+                        (ahead, bit) => cuts[ahead]
+                            .expect("no edge is cut of where there is no block")
+                            .vertex(direction, bit),
                     }
-                    _ => put([vertex(0, 1), vertex(0, 3), vertex(0, 2)]),
+                };
+                let [p, q, r] = [vertex(0), vertex(1), vertex(2)];
+                if ring.four {
+                    split([p, q, r, vertex(3)], vertices).into_iter().for_each(&mut put);
+                } else {
+                    put([p, q, r]);
                 }
             }
         }
     }
 }
+
+/// The edges of a tetrahedron that the surface cuts, in the order of the face's corners.
+#[derive(Clone, Copy)]
+struct Ring {
+    /// Direction, and cube ahead.
+    edges: [[u8; 2]; 4],
+    /// Whether they are four, or three.
+    four: bool,
+}
+
+/// For each tetrahedron and each set of its corners inside.
+const RINGS: [[Ring; 16]; TETRAHEDRA.len()] = {
+    let mut rings = [[Ring { edges: [[0; 2]; 4], four: false }; 16]; TETRAHEDRA.len()];
+    let mut i = 0;
+    while i < TETRAHEDRA.len() * 16 {
+        let (tetrahedron, set) = (&TETRAHEDRA[i / 16], i % 16);
+        let pairs = match set.count_ones() {
+            1 => [[0, 1], [0, 2], [0, 3], [0, 3]],
+            2 => [[0, 2], [0, 3], [1, 3], [1, 2]],
+            _ => [[0, 1], [0, 3], [0, 2], [0, 2]],
+        };
+        let ring = &mut rings[i / 16][set];
+        ring.four = set.count_ones() == 2;
+        let mut corner = 0;
+        while corner < 4 {
+            let [from, to] = pairs[corner];
+            let Edge { direction, ahead } = tetrahedron.edges[FEWER_FIRST[set][from]][FEWER_FIRST[set][to]];
+            ring.edges[corner] = [direction as u8, ahead as u8];
+            corner += 1;
+        }
+        i += 1;
+    }
+    rings
+};
 
 /// A quadrilateral split at its shorter diagonal.
 fn split([p, q, r, s]: [u32; 4], vertices: &[Point3<f64>]) -> [[u32; 3]; 2] {
@@ -154,21 +195,56 @@ fn split([p, q, r, s]: [u32; 4], vertices: &[Point3<f64>]) -> [[u32; 3]; 2] {
     if apart(p, r) <= apart(q, s) { [[p, q, r], [p, r, s]] } else { [[p, q, s], [q, r, s]] }
 }
 
+/// An end of an edge.
+#[derive(Clone, Copy)]
+struct End<'a> {
+    grove: &'a Grove,
+    block: &'a Block,
+    kind: usize,
+    bit: usize,
+    inside: bool,
+    /// The block ahead, and the leaf of it.
+    leaf: (usize, usize),
+}
+
+impl<'a> End<'a> {
+    /// The corner of the cube at `bit` of the first of the blocks.
+    fn of(blocks: &Blocks<'a>, Corner { kind, ahead }: Corner, bit: usize) -> Self {
+        let (ahead, bit) = cube_ahead(bit, ahead);
+        let (grove, block) = blocks[ahead].expect("no edge is cut to where there is no block");
+        let inside = block.inside[kind] >> bit & 1 == 1;
+        Self { grove, block, kind, bit, inside, leaf: (ahead, leaf_at(bit)) }
+    }
+
+    fn position(&self, solid: &Solid) -> Point3<f64> {
+        self.grove.position(solid, self.block, self.kind, self.bit)
+    }
+}
+
 /// Where the edge from a point inside to one outside first leaves the solid.
 ///
 /// It leaves the cone that decides at its start; where it does, another may contain it, of which it is
-/// followed to its end, until none does.
-fn crossing(solid: &Solid, blocks: &Blocks, [from, to]: [Point3<f64>; 2], mut cone: u32) -> Point3<f64> {
+/// followed to its end, until none does. None can where an end of the edge knows that all others are further.
+fn crossing(solid: &Solid, blocks: &Blocks, start: End, end: End) -> Point3<f64> {
+    let [from, to] = [start, end].map(|end| end.position(solid));
+    let mut cone = start.block.cone(start.kind, start.bit);
     let step = to - from;
+    let square = step.norm_squared() / (solid.lattice.cube * solid.lattice.cube);
     let mut share = 0.0;
     for _ in 0..MAX_STEPS {
         let Some(exit) = solid.distances[cone as usize].exit(&from, &step) else { break };
         share = exit;
         let p = from + step * share;
-        let (ahead, leaf) = blocks[0].expect("a block").1.leaf_of(solid.lattice, &p);
-        let Some((grove, block)) = blocks.get(ahead).copied().flatten() else { break };
+        let leaf = blocks[0].expect("a block").1.leaf_of(solid.lattice, &p);
+        let alone = |end: End, share: f64| {
+            end.leaf == leaf && end.block.alone(cone, end.kind, end.bit, share * share * square)
+        };
+        if alone(start, share) || alone(end, 1.0 - share) {
+            break;
+        }
+        let Some((grove, block)) = blocks.get(leaf.0).copied().flatten() else { break };
         let exact = EXACT * solid.lattice.cube;
-        let Some(deeper) = grove.deepest_but(cone, solid, (block, leaf), (&p, exact)) else { break };
+        let Some(deeper) = grove.deepest_but(cone, solid, (block, leaf.1), (&p, exact)) else { break };
         cone = deeper;
     }
     from + step * share.clamp(END, 1.0 - END)

@@ -83,7 +83,9 @@ pub fn balls() -> Vec<([f64; 3], f64)> {
         .collect()
 }
 
-/// Their surface at 128 cells along the cube.
+/// Their surface, at a cell with which it is as true as the surface nets of 128^3 points and has as many
+/// vertices: middles of faces lie 0.076 / 128 off the balls (the square root of the mean square by area; the
+/// mean is 0.044 / 128) with 65,858 vertices, those of the surface nets 0.077 / 128 (0.059 / 128) with 69,176.
 fn surface_of_balls() -> Box<dyn Kernel> {
     let cones: Vec<_> = balls()
         .into_iter()
@@ -91,7 +93,7 @@ fn surface_of_balls() -> Box<dyn Kernel> {
         .collect();
     step(
         (Mesher::default(), Mesh::default()),
-        move |(mesher, mesh)| mesher.surface(&cones, 1.0 / 128.0, mesh).unwrap(),
+        move |(mesher, mesh)| mesher.surface(&cones, 1.4 / 128.0, mesh).unwrap(),
         |(_, mesh)| {
             let counts = [mesh.vertices.len(), mesh.faces.len()];
             counts.iter().flat_map(|n| (*n as u64).to_le_bytes()).collect()
