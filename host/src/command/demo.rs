@@ -2,7 +2,8 @@
 //!
 //! Renders a shape (torus, torus_tilt, sphere, capsule, screwdriver, block, teapot, mouse or animal),
 //! reconstructs it from the two images alone, and measures how far the model is from the shape. Leaves the images,
-//! calib.yaml, truth.ply, model.ply, skeleton.ply, boundary.ply, report.json and pictures.
+//! calib.yaml, truth.ply, model.ply, skeleton.ply, boundary.ply, report.json, pictures, and report.html, which shows
+//! all of it in a browser: the model turning, both views with every stage, the error in colour.
 //!
 //! Examples:
 //!   host demo
@@ -37,6 +38,9 @@ pub struct Args {
     /// Folder for the results [default: ossature-demo/NAME]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Leave out report.html
+    #[arg(long)]
+    no_report: bool,
     /// Print one JSON document instead of text
     #[arg(long)]
     pub(super) json: bool,
@@ -60,6 +64,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         calibration: &scene.calibration,
         options: &reconstruct::Options::default(),
         pictures: true,
+        page: (!args.no_report).then_some(shape.name()),
         truth: Some(&scene.truth),
         folder: &folder,
     })?;

@@ -26,6 +26,8 @@ pub(super) struct Order<'a> {
     pub(super) options: &'a Options,
     /// Whether to draw the stages.
     pub(super) pictures: bool,
+    /// What a page about it is called, if there is to be one.
+    pub(super) page: Option<&'a str>,
     /// The true surface, to be shown beside the model.
     pub(super) truth: Option<&'a Mesh>,
     /// Where the results go.
@@ -48,7 +50,7 @@ pub(super) fn make(order: Order<'_>) -> Result<Model, Failure> {
     let mut record = if order.pictures { Record::new() } else { Record::figures_only() };
     let reconstruction = reconstruct(left, right, calibration, options, &mut record)?;
     let run = Run { calibration, options, reconstruction: &reconstruction, record: &record, truth };
-    let report = written(order.folder, &run)?;
+    let report = written(order.folder, &run, order.page)?;
     Ok(Model { reconstruction, report, time: start.elapsed() })
 }
 
@@ -88,13 +90,13 @@ pub(super) fn receive(
     let reconstruction = reconstruct_shape(&mut inbox.memory(), outcome, model, options, &mut record)?;
     let calibration = &model.into();
     let run = Run { calibration, options, reconstruction: &reconstruction, record: &record, truth: None };
-    let report = written(folder, &run)?;
+    let report = written(folder, &run, None)?;
     Ok(Model { reconstruction, report, time: start.elapsed() })
 }
 
 /// Writes all files of a run; returns its report.
-fn written(folder: &Path, run: &Run<'_>) -> Result<serde_json::Value, Failure> {
-    output::write(folder, run)?;
+fn written(folder: &Path, run: &Run<'_>, page: Option<&str>) -> Result<serde_json::Value, Failure> {
+    output::write(folder, run, page)?;
     Ok(serde_json::from_slice(&numbers::json(run))?)
 }
 

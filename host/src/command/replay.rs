@@ -208,7 +208,8 @@ fn one(
             return Ok((model::make_as_device(images, &calibration, options, folder)?, beside));
         }
         let pictures = !args.no_pictures;
-        let order = Order { images, calibration: &calibration, options, pictures, truth: None, folder };
+        let order =
+            Order { images, calibration: &calibration, options, pictures, page: None, truth: None, folder };
         Ok((model::make(order)?, beside))
     };
     let (model, calibration) = make().map_err(|failure| with_warnings(&warnings, failure))?;

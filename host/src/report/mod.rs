@@ -1,10 +1,11 @@
 //! What a run says, in the order in which it arises: what the core made ([`record`]), the figures
-//! (`report.json`, [`numbers`]), the pictures ([`pictures`]), and sentences for people ([`words`]).
+//! (`report.json`, [`numbers`]), the pictures ([`pictures`]), the page ([`page`]), and sentences for people ([`words`]).
 
 pub mod words;
 pub mod record;
 pub mod numbers;
 pub mod pictures;
+pub mod page;
 
 use crate::calibration::StereoCamera;
 use crate::mesh::Mesh;

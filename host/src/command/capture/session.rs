@@ -186,6 +186,7 @@ impl<'a> Session<'a> {
             calibration: &calibration,
             options: self.options,
             pictures: !self.args.no_pictures,
+            page: None,
             truth: None,
             folder,
         })
