@@ -2,7 +2,7 @@
 # The one list of checks.
 #
 #   ./ci.sh            everything
-#   ./ci.sh NAME...    single parts: fmt lint test doc firmware v4l2, and qemu, which test contains
+#   ./ci.sh NAME...    single parts: fmt lint test bench doc firmware v4l2, and qemu, which test contains
 #
 # Installs what a fresh Debian machine with rustup lacks. The last line is "N passed, N failed", counting
 # tests, and one for each check that is not made of tests. A part that ran no test fails. Exit codes: 0 all
@@ -10,7 +10,7 @@
 set -uo pipefail
 cd "$(dirname "$0")" || exit 1
 
-PARTS=(fmt lint test doc firmware v4l2)
+PARTS=(fmt lint test bench doc firmware v4l2)
 TARGET=thumbv7em-none-eabihf
 CASES=../shared/eval
 
@@ -121,6 +121,9 @@ part_test() {
     check cargo run -q --release --locked -p host -- demo --out target/ci-demo
 }
 
+# Each bench runs, once; what it takes is for a quiet machine. Against other programs: tests/peers/README.md.
+part_bench() { check cargo bench -q --locked -p system-tests -- --test 640x480; }
+
 part_doc() { RUSTDOCFLAGS="-D warnings" check cargo doc -q --workspace --no-deps --locked; }
 
 part_firmware() {
@@ -136,11 +139,12 @@ part_firmware() {
     tests cargo test -q --locked -p system-tests --test footprint -- --nocapture
 }
 
-# What images take; the core on emulated boards held against the core on this machine, stage by stage; and the
-# whole device on such a board, listened to.
+# What images take; the core on emulated boards held against the core on this machine, stage by stage, and to
+# the instructions that it took before; and the whole device on such a board, listened to.
 part_qemu() {
     emulator
-    tests cargo test -q --locked -p system-tests --test emulator --test emulated_link --test footprint -- --nocapture
+    tests cargo test -q --locked -p system-tests --test emulator --test instructions --test emulated_link \
+        --test footprint -- --nocapture
 }
 
 # Capture from a real driver, in an emulated machine with a kernel that has one.

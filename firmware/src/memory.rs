@@ -18,6 +18,13 @@ use shared::stage::nearest::Pair;
 use shared::stage::nurbs::Control;
 use shared::stage::rows::ContourMatch;
 
+/// How this machine runs the core's inner loops.
+#[cfg(target_os = "none")]
+const KERNELS: Kernels = crate::board::dsp::KERNELS;
+/// How this machine runs the core's inner loops.
+#[cfg(not(target_os = "none"))]
+const KERNELS: Kernels = Kernels::PORTABLE;
+
 /// Loops of a contour.
 const LOOPS: usize = 64;
 
@@ -113,7 +120,7 @@ macro_rules! storage {
                     boundary_pairs,
                     skeleton_pairs,
                     scratch: &mut self.scratch,
-kernels: Kernels::PORTABLE,
+                    kernels: KERNELS,
                 }
             }
         }

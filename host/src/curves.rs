@@ -12,3 +12,12 @@ pub struct Curves {
     /// Neighbouring points.
     pub edges: Vec<[u32; 2]>,
 }
+
+impl Curves {
+    /// Empties it, and keeps its memory.
+    pub(crate) fn clear(&mut self) {
+        self.points.clear();
+        self.radii.clear();
+        self.edges.clear();
+    }
+}

@@ -8,6 +8,8 @@ pub mod calibration;
 
 // What happens to it.
 pub mod memory;
+pub mod wide;
+pub mod runs;
 pub mod stage;
 pub mod reconstruct;
 

@@ -1,8 +1,8 @@
-//! The memory that the core's pipeline borrows, allocated once for a size of image.
+//! The memory that the core's pipeline borrows, allocated once for the largest size of image.
 
 use shared::bitmap::{Size, Word};
 use shared::limits::CapacityError;
-use shared::pipeline::{Branch, EyeMemory, Kernels, Memory, scratch_words};
+use shared::pipeline::{Branch, EyeMemory, Memory, scratch_words};
 use shared::point::PixelPoint;
 use shared::stage::branch::Sample;
 use shared::stage::contour::{ContourLoop, ContourPoint};
@@ -12,7 +12,7 @@ use shared::stage::medial::MedialBall;
 use shared::stage::nearest::Pair;
 use shared::stage::nurbs::{Control, MAX_CONTROLS};
 use shared::stage::rows::ContourMatch;
-use shared::stage::thinning::scratch_order;
+use shared::stage::sequential_thinning::scratch_order;
 
 /// Contour points, path pixels and crossings: a silhouette of 3840x2160 has about 12,000.
 const POINTS: usize = 1 << 15;
@@ -38,10 +38,6 @@ struct Eye {
 }
 
 impl Eye {
-    fn new(size: Size) -> Self {
-        Self { mask: vec![0; size.words()], ..Self::default() }
-    }
-
     fn lend(&mut self) -> EyeMemory<'_> {
         EyeMemory {
             mask: &mut self.mask,
@@ -73,29 +69,49 @@ pub struct Storage {
     skeleton_pairs: List<Pair, POINTS>,
 }
 
+impl Default for Storage {
+    /// Memory for images without pixels.
+    fn default() -> Self {
+        Self {
+            size: Size { width: 0, height: 0 },
+            eyes: Default::default(),
+            scratch: Vec::new(),
+            matches: List::default(),
+            balls: List::default(),
+            depths: List::default(),
+            boundary_pairs: List::default(),
+            skeleton_pairs: List::default(),
+        }
+    }
+}
+
 impl Storage {
     /// Memory for images of this size.
     ///
     /// # Errors
     /// A [`CapacityError`] for images beyond [`shared::limits::MAX_SIDE`].
     pub fn new(width: usize, height: usize) -> Result<Self, CapacityError> {
-        let size = Size::new(width, height)?;
-        Ok(Self {
-            size,
-            eyes: [Eye::new(size), Eye::new(size)],
-            scratch: vec![
-                0;
-                scratch_words(size, POINTS, MAX_CONTROLS, scratch_order(size.pixels(), u16::MAX))
-            ],
-            matches: List::default(),
-            balls: List::default(),
-            depths: List::default(),
-            boundary_pairs: List::default(),
-            skeleton_pairs: List::default(),
-        })
+        let mut storage = Self::default();
+        storage.fit(width, height)?;
+        Ok(storage)
     }
 
-    /// The size it was made for.
+    /// Make it memory for images of another size. Nothing is allocated unless they are larger than all before.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn fit(&mut self, width: usize, height: usize) -> Result<(), CapacityError> {
+        let size = Size::new(width, height)?;
+        self.size = size;
+        for eye in &mut self.eyes {
+            lengthen(&mut eye.mask, size.words());
+        }
+        let order = scratch_order(size.pixels(), u16::MAX);
+        lengthen(&mut self.scratch, scratch_words(size, POINTS, MAX_CONTROLS, order));
+        Ok(())
+    }
+
+    /// The size it is for.
     pub const fn size(&self) -> Size {
         self.size
     }
@@ -111,7 +127,16 @@ impl Storage {
             boundary_pairs: &mut *self.boundary_pairs,
             skeleton_pairs: &mut *self.skeleton_pairs,
             scratch: &mut self.scratch,
-            kernels: Kernels::PORTABLE,
+            kernels: crate::wide::kernels(),
         }
+    }
+}
+
+/// Give a list a length. What stood in it is of no use, and memory that the system gives is zero already.
+fn lengthen<T: Clone + Default>(list: &mut Vec<T>, length: usize) {
+    if length > list.capacity() {
+        *list = vec![T::default(); length];
+    } else {
+        list.resize(length, T::default());
     }
 }

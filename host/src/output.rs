@@ -31,13 +31,14 @@ pub(crate) const PICTURES: &str = "pictures";
 /// The page.
 const PAGE: &str = "report.html";
 
-/// Write all files of a run into `folder`, which is created if it is missing; a page if it has a title.
+/// Write all files of a run into `folder`, which is created if it is missing, and a page if that is wanted;
+/// returns the report's text.
 ///
 /// # Errors
 /// [`ExportError`] with the file or folder that could not be written.
-pub fn write(folder: &Path, run: &Run<'_>, title: Option<&str>) -> Result<(), ExportError> {
+pub fn write(folder: &Path, run: &Run<'_>, page: bool) -> Result<Vec<u8>, ExportError> {
     let created = create(folder)?;
-    let result = write_into(folder, run, title);
+    let result = write_into(folder, run, page);
     if result.is_err() {
         for folder in created.iter().rev() {
             // What still holds files stays: then it is no longer ours alone.
@@ -92,16 +93,19 @@ fn failed(path: &Path, source: io::Error) -> ExportError {
     ExportError::Io { path: path.to_path_buf(), source }
 }
 
-fn write_into(folder: &Path, run: &Run<'_>, title: Option<&str>) -> Result<(), ExportError> {
+fn write_into(folder: &Path, run: &Run<'_>, page: bool) -> Result<Vec<u8>, ExportError> {
     let staged = tempfile::Builder::new()
         .prefix(".unfinished-")
         .tempdir_in(folder)
         .map_err(|source| failed(folder, source))?;
     let stage = Stage { folder, staged: staged.path() };
     let mut names = stage.models(run.reconstruction)?;
-    names.push(stage.bytes("report.json", &numbers::json(run))?);
-    if let Some(title) = title {
-        names.push(stage.bytes(PAGE, page::html(run, title).as_bytes())?);
+    // Only a mesh that could be written is sound enough to be measured.
+    let report = numbers::json(run);
+    names.push(stage.bytes("report.json", &report)?);
+    if page {
+        let title = folder.file_name().map_or("Ossature".into(), |name| name.to_string_lossy());
+        names.push(stage.bytes(PAGE, page::html(run, &report, &title).as_bytes())?);
     }
     let drawn = pictures::draw(run);
     if !drawn.is_empty() {
@@ -111,7 +115,8 @@ fn write_into(folder: &Path, run: &Run<'_>, title: Option<&str>) -> Result<(), E
     let pictures =
         drawn.par_iter().map(|(name, picture)| stage.picture(&format!("{PICTURES}/{name}"), picture));
     names.extend(pictures.collect::<Result<Vec<_>, _>>()?);
-    stage.finish(&names)
+    stage.finish(&names)?;
+    Ok(report)
 }
 
 /// Files on their way into a folder.
@@ -217,12 +222,12 @@ mod tests {
     fn a_folder_speaks_of_one_run() {
         let parent = tempfile::tempdir().unwrap();
         let folder = parent.path().join("new/model");
-        write(&folder, &Capsule::new(Mode::Default, Record::new()).run(), Some("capsule")).unwrap();
+        write(&folder, &Capsule::new(Mode::Default, Record::new()).run(), true).unwrap();
         let files = ["boundary.ply", "model.ply", "pictures", "report.html", "report.json", "skeleton.ply"];
         assert_eq!(names(&folder), files);
         assert_eq!(names(&folder.join(PICTURES)), pictures::NAMES);
         fs::write(folder.join("pictures/mine.png"), "kept").unwrap();
-        write(&folder, &Capsule::new(Mode::Default, Record::figures_only()).run(), None).unwrap();
+        write(&folder, &Capsule::new(Mode::Default, Record::figures_only()).run(), false).unwrap();
         assert_eq!(
             names(&folder),
             files.iter().filter(|f| **f != "report.html").copied().collect::<Vec<_>>()
@@ -255,7 +260,7 @@ mod tests {
         let capsule = Capsule::new(Mode::Default, Record::figures_only());
         fs::create_dir(parent.path().join("report.json")).unwrap();
         fs::write(parent.path().join("model.ply"), "old").unwrap();
-        let error = write(parent.path(), &capsule.run(), None).unwrap_err();
+        let error = write(parent.path(), &capsule.run(), false).unwrap_err();
         assert!(error.to_string().ends_with("report.json"), "{error}");
         assert_eq!(names(parent.path()), ["model.ply", "report.json"]);
         assert_eq!(fs::read(parent.path().join("model.ply")).unwrap(), b"old");
@@ -266,10 +271,10 @@ mod tests {
         let parent = tempfile::tempdir().unwrap();
         let mut capsule = Capsule::new(Mode::Default, Record::figures_only());
         fs::write(parent.path().join("file"), "").unwrap();
-        let error = write(&parent.path().join("file/models"), &capsule.run(), None).unwrap_err();
+        let error = write(&parent.path().join("file/models"), &capsule.run(), false).unwrap_err();
         assert!(error.to_string().ends_with("file/models"), "{error}");
         capsule.made.mesh.faces.push([u32::MAX; 3]);
-        assert!(write(&parent.path().join("a/b"), &capsule.run(), None).is_err());
+        assert!(write(&parent.path().join("a/b"), &capsule.run(), false).is_err());
         assert_eq!(names(parent.path()), ["file"]);
     }
 }

@@ -259,6 +259,41 @@ fn results_beside_their_pairs_do_not_hide_them() {
 }
 
 #[test]
+fn timings_are_a_row_a_stage_beside_the_results() {
+    let folder = TempDir::new().unwrap();
+    for pair in ["many/a", "many/b"] {
+        fs::create_dir_all(folder.path().join(pair)).unwrap();
+        for file in ["left.png", "right.png", "calib.yaml"] {
+            fs::copy(torus(file), folder.path().join(pair).join(file)).unwrap();
+        }
+    }
+    let output = run(folder.path(), &["replay", "many", "--no-pictures", "--timings", "--json"]);
+    assert_eq!(json(std::str::from_utf8(&output.stdout).unwrap())["pairs"].as_array().unwrap().len(), 2);
+    let told = String::from_utf8(output.stderr).unwrap();
+    let lines: Vec<&str> = told.lines().collect();
+    assert_eq!(lines[0], "stage                   median ms   worst ms      share");
+    let (last, rows) = lines[1..].split_last().unwrap();
+    assert!(last.starts_with("2 pairs in ") && last.ends_with(" a second"), "{told}");
+    let names: Vec<&str> = rows.iter().map(|row| row[..22].trim()).collect();
+    let eye = |side| {
+        ["threshold", "mask", "boundary", "contour", "distance", "thinning", "graph"]
+            .map(|s| format!("{side} {s}"))
+    };
+    let expected = [
+        ["load", "rectify"].map(String::from).to_vec(),
+        [eye("left"), eye("right")].concat(),
+        ["left hull", "right hull", "pair correspondence", "pair rows", "pair balls", "pair curves"]
+            .map(String::from)
+            .to_vec(),
+        ["refine", "smooth", "radii", "grow", "surface", "write", "rest", "all"].map(String::from).to_vec(),
+    ];
+    assert_eq!(names, expected.concat());
+    let share = |row: &&str| row[44..].trim_end_matches(" %").trim().parse::<f64>().unwrap();
+    let shares: f64 = rows[..rows.len() - 1].iter().map(share).sum();
+    assert!((shares - 100.0).abs() < 3.0, "{told}");
+}
+
+#[test]
 fn failures_are_json_too_if_asked_for() {
     let folder = TempDir::new().unwrap();
     let failing: [&[&str]; 4] = [

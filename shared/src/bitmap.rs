@@ -64,7 +64,8 @@ impl Size {
 
     /// Whether the pixel lies inside.
     pub const fn contains(self, u: i32, v: i32) -> bool {
-        u >= 0 && v >= 0 && (u as usize) < self.width && (v as usize) < self.height
+        // What is negative is then beyond every side.
+        (u as usize) < self.width && (v as usize) < self.height
     }
 }
 
@@ -186,8 +187,10 @@ impl<'a> Bitmap<'a> {
     /// Set what is clear and clear what is set, inside the image.
     pub fn invert(&mut self) {
         let n = self.size.row_words().max(1);
-        for i in 0..self.words.len() {
-            self.words[i] ^= self.valid(i % n);
+        let valid = self.valid(n - 1);
+        for row in self.words.chunks_exact_mut(n) {
+            row.iter_mut().for_each(|word| *word = !*word);
+            row[n - 1] &= valid;
         }
     }
 
@@ -205,28 +208,27 @@ impl<'a> Bitmap<'a> {
 
     /// The smallest box that holds every set pixel.
     pub fn bounds(&self) -> Option<PixelBox> {
-        let mut span: Option<(usize, usize, usize, usize)> = None;
-        for v in 0..self.size.height {
-            if let Some((first, last)) = self.row_span(v) {
-                let (u0, v0, u1, _) = span.unwrap_or((first, v, last, v));
-                span = Some((u0.min(first), v0, u1.max(last), v));
-            }
-        }
-        span.map(|(u0, v0, u1, v1)| PixelBox {
-            min: Pixel { u: u0 as u16, v: v0 as u16 },
-            max: Pixel { u: u1 as u16, v: v1 as u16 },
+        let mut spans = self.spans();
+        let (top, first, last) = spans.next()?;
+        let whole = |(u0, u1, _), (v, first, last): (usize, usize, usize)| (first.min(u0), last.max(u1), v);
+        let (left, right, bottom) = spans.fold((first, last, top), whole);
+        Some(PixelBox {
+            min: Pixel { u: left as u16, v: top as u16 },
+            max: Pixel { u: right as u16, v: bottom as u16 },
         })
     }
 
-    /// First and last set pixel of a row.
-    pub fn row_span(&self, v: usize) -> Option<(usize, usize)> {
-        let row = self.row(v as i32);
-        let first = row.iter().position(|w| *w != 0)?;
-        let last = row.iter().rposition(|w| *w != 0)?;
-        Some((
-            first * WORD_BITS + row[first].trailing_zeros() as usize,
-            last * WORD_BITS + WORD_BITS - 1 - row[last].leading_zeros() as usize,
-        ))
+    /// Each row that has a set pixel, with its first and its last one: `(v, first, last)`.
+    pub fn spans(&self) -> impl Iterator<Item = (usize, usize, usize)> + '_ {
+        self.words.chunks_exact(self.size.row_words().max(1)).enumerate().filter_map(|(v, row)| {
+            let first = row.iter().position(|w| *w != 0)?;
+            let last = row.iter().rposition(|w| *w != 0)?;
+            Some((
+                v,
+                first * WORD_BITS + row[first].trailing_zeros() as usize,
+                last * WORD_BITS + WORD_BITS - 1 - row[last].leading_zeros() as usize,
+            ))
+        })
     }
 
     /// The set pixels in raster order.
@@ -239,7 +241,20 @@ impl<'a> Bitmap<'a> {
     }
 
     /// The eight neighbours of a pixel as a byte, bit 0 north, then clockwise: N NE E SE S SW W NW.
+    #[inline]
     pub fn neighbours(&self, u: i32, v: i32) -> u8 {
+        let (bit, place) = (u as usize % WORD_BITS, u as usize / WORD_BITS);
+        if bit == 0 || bit == WORD_BITS - 1 || !self.size.contains(u, v) {
+            return self.neighbours_apart(u, v);
+        }
+        let (n, i) = (self.size.row_words(), v as usize * self.size.row_words() + place);
+        let three = |i: usize| at(self.words, i) >> (bit - 1) & 0b111;
+        AROUND_OF_SQUARE[(three(i.wrapping_sub(n)) | three(i) << 3 | three(i + n) << 6) as usize]
+    }
+
+    /// [`Self::neighbours`], some of which lie in another word or outside.
+    #[cold]
+    fn neighbours_apart(&self, u: i32, v: i32) -> u8 {
         const AROUND: [(i32, i32); 8] =
             [(0, -1), (1, -1), (1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1)];
         AROUND.iter().enumerate().fold(0, |n, (k, (du, dv))| n | u8::from(self.get(u + du, v + dv)) << k)
@@ -250,6 +265,22 @@ impl<'a> Bitmap<'a> {
         neighbours_in_rows(self.row(v - 1), self.row(v), self.row(v + 1), i)
     }
 }
+
+/// [`Bitmap::neighbours`] of the square of 3x3 pixels whose rows are bits 0 to 2, 3 to 5 and 6 to 8.
+const AROUND_OF_SQUARE: [u8; 512] = {
+    const PLACES: [usize; 8] = [1, 2, 5, 8, 7, 6, 3, 0];
+    let mut around = [0; 512];
+    let mut square = 0;
+    while square < 512 {
+        let mut k = 0;
+        while k < 8 {
+            around[square] |= ((square >> PLACES[k] & 1) as u8) << k;
+            k += 1;
+        }
+        square += 1;
+    }
+    around
+};
 
 /// [`Bitmap::neighbour_words`] of word `i` of the row `here`, from the rows themselves.
 pub fn neighbours_in_rows(above: &[Word], here: &[Word], below: &[Word], i: usize) -> [Word; 8] {
@@ -393,9 +424,12 @@ impl<'a> Grey<'a> {
 
     /// The grey value at a pixel; outside the image that of the nearest pixel, 0 if there is none.
     pub fn get(&self, u: i32, v: i32) -> u8 {
-        let u = u.clamp(0, (self.size.width as i32 - 1).max(0)) as usize;
-        let v = v.clamp(0, (self.size.height as i32 - 1).max(0)) as usize;
-        self.data.get(v * self.stride + u).copied().unwrap_or(0)
+        let (mut u, mut v) = (u, v);
+        if !self.size.contains(u, v) {
+            u = u.clamp(0, (self.size.width as i32 - 1).max(0));
+            v = v.clamp(0, (self.size.height as i32 - 1).max(0));
+        }
+        self.data.get(v as usize * self.stride + u as usize).copied().unwrap_or(0)
     }
 
     /// A row; empty outside the image.

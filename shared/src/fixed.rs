@@ -23,9 +23,15 @@ pub const fn div_round(n: i64, d: i64) -> i64 {
     }
     // Quotients of i64::MIN would overflow; no stage comes near it.
     let half = d.unsigned_abs() / 2;
-    let q = n.unsigned_abs().saturating_add(half) / d.unsigned_abs();
+    let q = div_floor(n.unsigned_abs().saturating_add(half), d.unsigned_abs());
     let q = if q > i64::MAX as u64 { i64::MAX } else { q as i64 };
     if (n < 0) != (d < 0) { -q } else { q }
+}
+
+/// `n / d` rounded down; `d` is not 0. One instruction where both have 32 bits, as they nearly always have: a
+/// microcontroller divides longer ones in software.
+pub const fn div_floor(n: u64, d: u64) -> u64 {
+    if (n | d) >> 32 == 0 { (n as u32 / d as u32) as u64 } else { n / d }
 }
 
 /// `v` saturated to `i32`.
@@ -39,10 +45,15 @@ pub const fn saturate(v: i64) -> i32 {
     }
 }
 
+/// The square root of `x`, rounded down; short where `x` has 32 bits.
+pub const fn isqrt(x: u64) -> u64 {
+    if x >> 32 == 0 { (x as u32).isqrt() as u64 } else { x.isqrt() }
+}
+
 /// Length of the vector `(a, b)`, in its own unit, rounded down. |a|, |b| < 2^31.
 pub const fn hypot(a: i32, b: i32) -> i32 {
     let (a, b) = (a as i64, b as i64);
-    saturate(((a * a + b * b) as u64).isqrt() as i64)
+    saturate(isqrt((a * a + b * b) as u64) as i64)
 }
 
 /// Base-two logarithm of `x`, in 1/65536; 0 for `x` = 0. Error below 3/65536.
@@ -54,11 +65,11 @@ pub const fn log2(x: u64) -> i32 {
         return 0;
     }
     let whole = x.ilog2();
-    let mut m = if whole >= 30 { x >> (whole - 30) } else { x << (30 - whole) };
+    let mut m = if whole >= 30 { x >> (whole - 30) } else { x << (30 - whole) } as u32;
     let mut log = (whole as i32) << 16;
     let mut bit = 1 << 15;
     while bit > 0 {
-        m = (m * m) >> 30;
+        m = ((m as u64 * m as u64) >> 30) as u32;
         if m >= 2 << 30 {
             m >>= 1;
             log += bit;

@@ -8,8 +8,11 @@ pub mod arena;
 pub mod fixed;
 pub mod point;
 pub mod bitmap;
+pub mod pack;
+pub mod lanes;
 pub mod pattern;
 pub mod envelope;
+pub mod strips;
 pub mod camera;
 
 // What happens to a picture.

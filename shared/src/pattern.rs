@@ -4,6 +4,7 @@
 //! that does not matter, `C` the centre, which must be set. Outside the image is clear.
 
 use crate::bitmap::Word;
+use crate::lanes::Lanes;
 
 /// A 3x3 hit-or-miss pattern with a set centre; bits in the order of `Bitmap::neighbours`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,17 +51,18 @@ impl Pattern {
         neighbours & self.hit == self.hit && neighbours & self.miss == 0
     }
 
-    /// The set pixels of a word around which the pattern fits.
-    pub fn fits_word(self, here: Word, neighbours: [Word; 8]) -> Word {
-        neighbours.iter().enumerate().fold(here, |fit, (k, &word)| {
+    /// Bit by bit: whether the pattern fits around pixels with these neighbours.
+    #[inline(always)]
+    pub fn fits_words<L: Lanes>(self, neighbours: [L; 8]) -> L {
+        let mut fit = L::splat(Word::MAX);
+        for (k, words) in neighbours.into_iter().enumerate() {
             if self.hit >> k & 1 == 1 {
-                fit & word
+                fit = fit & words;
             } else if self.miss >> k & 1 == 1 {
-                fit & !word
-            } else {
-                fit
+                fit = fit & !words;
             }
-        })
+        }
+        fit
     }
 }
 
@@ -118,7 +120,7 @@ mod tests {
         for _ in 0..4 {
             for code in 0..=u8::MAX {
                 let words = core::array::from_fn(|k| Word::from(code >> k & 1));
-                assert_eq!(pattern.fits_word(1, words) == 1, pattern.fits(code));
+                assert_eq!(pattern.fits_words(words) & 1 == 1, pattern.fits(code));
             }
             pattern = pattern.turned();
         }

@@ -1,6 +1,6 @@
 //! Points of the image plane and the one exact predicate on them.
 
-use crate::fixed::{PX, UNIT, div_round, hypot};
+use crate::fixed::{PX, UNIT, div_round, hypot, isqrt};
 use bytemuck::{Pod, Zeroable};
 
 /// A pixel by column and row.
@@ -40,7 +40,7 @@ impl PixelPoint {
 
     /// Distance, 1/256 px, rounded down.
     pub const fn distance(self, other: Self) -> i32 {
-        (self.distance_squared(other) as u64).isqrt() as i32
+        isqrt(self.distance_squared(other) as u64) as i32
     }
 
     /// The point a fraction `num / den` of the way to `other`.

@@ -12,6 +12,7 @@ use shared::stage::medial::medial_balls;
 use shared::stage::nearest::pair_nearest;
 use shared::stage::plane::{AffineMap, ImagePlane, Observation};
 use shared::stage::rows::{RowCrossing, count_crossings, match_rows, row_crossings};
+use shared::strips::{Disc, Strips};
 
 fn at(u: f64, v: f64) -> PixelPoint {
     let fixed = |x: f64| (x * f64::from(PX)).round() as i32;
@@ -115,20 +116,24 @@ fn partners_are_the_nearest() {
     for n in 0..60 {
         let (left, right) = (points(40), points(n));
         let map = AffineMap::fit((0..4).map(|k| (left[k], left[(k + 1) % 4]))).unwrap();
-        let mut pairs = List::<_, 64>::new();
-        pair_nearest(left.iter().copied(), || right.iter().copied(), &map, &mut pairs).unwrap();
+        let (mut pairs, mut block) = (List::<_, 64>::new(), [7; 256]);
+        let right_points = || right.iter().copied();
+        pair_nearest(left.iter().copied(), right_points, &map, Arena::new(&mut block), &mut pairs).unwrap();
         assert_eq!(pairs.len(), if n == 0 { 0 } else { 40 });
         for (pair, l) in pairs.iter().zip(&left) {
             let [u, v] = px(map.apply(*l));
             let distance = |r: &PixelPoint| (px(*r)[0] - u).hypot(px(*r)[1] - v);
             let least = right.iter().map(distance).fold(f64::INFINITY, f64::min);
             assert!(pair.left == *l && distance(&pair.right) <= least);
+            let first = right.iter().min_by_key(|r| map.apply(*l).distance_squared(**r));
+            assert_eq!(first, Some(&pair.right), "of equals the first");
         }
     }
     let full = pair_nearest(
         [at(0.0, 0.0); 3].into_iter(),
         || [at(1.0, 1.0)].into_iter(),
         &AffineMap::default(),
+        Arena::new(&mut [7; 64]),
         &mut List::<_, 2>::new(),
     );
     assert!(full.is_err());
@@ -155,10 +160,10 @@ fn curve(random: &mut Random, n: usize) -> Vec<ContourPoint> {
 #[test]
 fn balls_are_the_largest_that_the_definition_allows() {
     let mut random = Random(6);
-    let mut balls = List::<_, 512>::new();
+    let (mut balls, mut block) = (List::<_, 1024>::new(), [7; 1024]);
     for case in 0..12 {
         let points = curve(&mut random, 120 + 40 * case);
-        medial_balls(&points, &mut balls).unwrap();
+        medial_balls(&points, Arena::new(&mut block), &mut balls).unwrap();
         assert!(balls.len() > points.len() / 3, "{} of {}", balls.len(), points.len());
         let floats: Vec<_> = points
             .iter()
@@ -179,7 +184,105 @@ fn balls_are_the_largest_that_the_definition_allows() {
             assert!(deepest >= ball.rho - PX * 2 / 5 - 1);
         }
     }
-    assert!(medial_balls(&curve(&mut random, 200), &mut List::<_, 3>::new()).is_err());
+    let many = curve(&mut random, 200);
+    assert!(medial_balls(&many, Arena::new(&mut block), &mut List::<_, 3>::new()).is_err());
+    assert!(medial_balls(&many, Arena::new(&mut block[..9]), &mut balls).is_err());
+}
+
+/// Rows of points with normals such as no contour has, a kind a number.
+fn adversary(random: &mut Random, kind: usize) -> Vec<ContourPoint> {
+    let n = [0, 1, 2, 9, 33, 64, 150][random.below(7) as usize];
+    let reach = [3, 300, 20_000, 1 << 20][random.below(4) as usize];
+    let mut any = |reach: i32| (random.below(2 * reach as u64 + 1)) as i32 - reach;
+    let turn = f64::from(any(1 << 12)) / 652.0;
+    let direction = |t: f64, length: f64| {
+        let part = |x: f64| (x * length * f64::from(UNIT)).round().clamp(-16384.0, 16384.0) as i16;
+        Direction { u: part(t.cos()), v: part(t.sin()) }
+    };
+    let place = |t: f64, r: f64| PixelPoint { u: (r * t.cos()) as i32, v: (r * t.sin()) as i32 };
+    let round = |k: usize| std::f64::consts::TAU * k as f64 / n as f64;
+    let size = f64::from(reach);
+    let point = |k: usize| {
+        let (at, normal) = match kind {
+            // Anywhere, with any normal.
+            0 => (
+                PixelPoint { u: any(reach), v: any(reach) },
+                Direction { u: any(16384) as i16, v: any(16384) as i16 },
+            ),
+            // On one line, looking along it and across.
+            1 => (place(turn, size * k as f64 / n as f64), direction(turn + round(k % 4 * n / 4), 1.0)),
+            // A circle: every disc is the same but for rounding; normals too long, or too short.
+            2 => (place(round(k), size), direction(round(k), 1.0)),
+            3 => (place(round(k), size), direction(round(k), 1.002)),
+            4 => (place(round(k), size), direction(round(k), 0.7)),
+            // All in one place, or in two.
+            5 => (
+                place(turn, size * (k % 2) as f64),
+                direction(turn + std::f64::consts::PI * (1 - k % 2) as f64, 1.0),
+            ),
+            // Two walls across from each other, whose normals are a little too long.
+            6 | 7 => {
+                let (side, along) = ((2 * (k % 2)) as f64 - 1.0, f64::from(any(reach)));
+                let wall = place(turn, side * size / 3.0);
+                let slide = place(turn + std::f64::consts::FRAC_PI_2, along);
+                let at = PixelPoint { u: wall.u + slide.u, v: wall.v + slide.v };
+                (at, direction(turn, side * [1.0, 1.0004][kind - 6]))
+            }
+            // A noisy blob.
+            _ => (place(round(k), size * (1.0 + f64::from(any(100)) / 1000.0)), direction(round(k), 1.0)),
+        };
+        ContourPoint { at, normal, border: false }
+    };
+    (0..n).map(point).collect()
+}
+
+#[test]
+fn balls_are_those_of_every_point_tried_in_turn() {
+    let mut random = Random(9);
+    let (mut balls, mut block) = (List::<_, 1024>::new(), [7; 1024]);
+    let mut found = [0; 10];
+    for case in 0..4000 {
+        let kind = case % 10;
+        let points = match kind {
+            9 => curve(&mut random, 8 + case % 200),
+            kind => adversary(&mut random, kind),
+        };
+        medial_balls(&points, Arena::new(&mut block), &mut balls).unwrap();
+        let wide = |a: i32, b: i32| [a, b].map(i64::from);
+        let rims: Vec<naive::Rim> =
+            points.iter().map(|p| (wide(p.at.u, p.at.v), [p.normal.u, p.normal.v].map(i64::from))).collect();
+        let expected = (0..rims.len()).filter_map(|i| {
+            let (centre, rho, contact) = naive::medial_ball(&rims, i, i64::from(PX) * 2 / 5)?;
+            Some((centre, rho, [i as u32, contact as u32]))
+        });
+        let balls: Vec<_> =
+            balls.iter().map(|b| (wide(b.centre.u, b.centre.v), i64::from(b.rho), b.contacts)).collect();
+        assert_eq!(balls, expected.collect::<Vec<_>>(), "kind {kind}, case {case}: {points:?}");
+        found[kind] += balls.len();
+    }
+    println!("balls of each kind: {found:?}");
+    assert!(found.iter().all(|count| *count > 100), "{found:?}");
+}
+
+#[test]
+fn strips_show_what_lies_inside() {
+    let mut random = Random(10);
+    let mut block = [7; 4096];
+    for case in 0..2000 {
+        let points: Vec<_> = adversary(&mut random, case % 9).iter().map(|p| p.at).collect();
+        let strips = Strips::new(&points, &mut Arena::new(&mut block)).unwrap();
+        let reach = [40, 5000, 1 << 20, 1 << 29][case % 4];
+        let mut any = || random.below(2 * reach) as i32 - reach as i32;
+        for _ in 0..20 {
+            let (centre, radius) = (PixelPoint { u: any(), v: any() }, i64::from(any().max(0)));
+            let disc = Disc { centre, squared: radius * radius };
+            let mut shown = Vec::new();
+            strips.walk(disc, |k, p, _| shown.push((k, *p)));
+            let inside = points.iter().copied().enumerate();
+            let inside: Vec<_> = inside.filter(|(_, p)| centre.distance_squared(*p) < disc.squared).collect();
+            assert_eq!(shown, inside);
+        }
+    }
 }
 
 /// Vertical edges: a closed loop for each bar, with a point every half pixel up and down its sides.

@@ -7,12 +7,14 @@ use shared::arena::{Arena, words};
 use shared::bitmap::{Bitmap, Grey, Plane, Size, Word};
 use shared::limits::CapacityError;
 use shared::point::{PixelPoint, orient};
-use shared::stage::binarise::{self, Polarity, Threshold, Tone};
+use shared::stage::binarise::{self, MedianRow, Polarity, Threshold, Tone};
 use shared::stage::boundary::{self, Element};
 use shared::stage::clean::{self, Components};
 use shared::stage::distance::{self, Parabola};
 use shared::stage::hull::{self, RowExtent};
-use shared::stage::thinning::{self, Report, Rule};
+use shared::stage::parallel_thinning::{self, Parallel, Report};
+use shared::stage::sequential_thinning;
+use shared::stage::thinning::{self, Rule};
 
 const RULES: [Rule; 4] = [Rule::HitOrMiss, Rule::ZhangSuen, Rule::GuoHall, Rule::EdtOrdered];
 
@@ -73,10 +75,12 @@ fn thin(image: &Image, rule: Rule) -> (Image, Report) {
         let plane = distance::distance(bitmap, &mut data, &mut parabolas).unwrap();
         let largest = (0..size.height).flat_map(|v| plane.row(v)).copied().max().unwrap_or(0);
         let mut block = match rule {
-            Rule::EdtOrdered => vec![7; words::<u32>(thinning::scratch_order(bitmap.count(), largest))],
-            _ => vec![7; words::<Word>(thinning::scratch_words(size))],
+            Rule::EdtOrdered => {
+                vec![7; words::<u32>(sequential_thinning::scratch_order(bitmap.count(), largest))]
+            }
+            _ => vec![7; words::<Word>(parallel_thinning::scratch_words(size))],
         };
-        thinning::thin(bitmap, rule, &plane, Arena::new(&mut block)).unwrap()
+        thinning::thin(bitmap, (rule, parallel_thinning::thin), &plane, Arena::new(&mut block)).unwrap()
     })
 }
 
@@ -85,8 +89,8 @@ fn largest_component_and_areas() {
     for image in images() {
         let (expected, largest, second) = naive::largest(&image);
         let count = naive::components(&image, true, true).len() as u32;
-        let mut scratch = vec![0x55; clean::scratch_words(naive::size(&image))];
-        let (kept, found) = on_bitmap(&image, |b| clean::keep_largest(b, &mut scratch).unwrap());
+        let mut block = vec![0x55; clean::scratch_words(naive::size(&image))];
+        let (kept, found) = on_bitmap(&image, |b| clean::keep_largest(b, Arena::new(&mut block)).unwrap());
         assert_eq!(kept, expected);
         assert_eq!(found, Components { count, largest: largest as u32, second: second as u32 });
     }
@@ -96,10 +100,13 @@ fn largest_component_and_areas() {
 fn holes_below_an_area_are_filled() {
     for image in images() {
         for below in [0, 2, clean::HOLE_AREA, u32::MAX] {
-            let mut scratch = vec![0x55; clean::scratch_words(naive::size(&image))];
-            let (filled, count) = on_bitmap(&image, |b| clean::fill_holes(b, below, &mut scratch).unwrap());
+            let mut block = vec![0x55; clean::scratch_words(naive::size(&image))];
+            let (filled, holes) =
+                on_bitmap(&image, |b| clean::fill_holes(b, below, Arena::new(&mut block)).unwrap());
             let expected = naive::fill_holes(&image, below as usize);
-            assert_eq!((filled, count as usize), expected);
+            let area = naive::set(&filled).len() - naive::set(&image).len();
+            assert_eq!((&filled, holes.count as usize), (&expected.0, expected.1));
+            assert_eq!(holes.area as usize, area);
         }
     }
 }
@@ -188,6 +195,36 @@ fn thinning_equals_its_twin() {
 }
 
 #[test]
+fn every_width_of_register_thins_alike() {
+    let widths = host::wide::widths();
+    for (name, thin) in widths {
+        if thin.is_none() {
+            eprintln!("\n!!!! SKIPPED: this machine has no {name}, so NOTHING is thinned in it !!!!\n");
+        }
+    }
+    let mut images: Vec<Image> = (1..=200usize)
+        .flat_map(|width| {
+            let (height, seed) = (1 + (7 * width) % 61, width as u64);
+            [naive::noise(width, height, 50 + seed % 45, seed), naive::blobs(width, 70 - height, seed)]
+        })
+        .collect();
+    // Blocks of more than one group of rows, and a last one that is not whole.
+    images.push(naive::noise(90, 2531, 95, 2));
+    for image in images {
+        for rule in [Parallel::HitOrMiss, Parallel::ZhangSuen, Parallel::GuoHall] {
+            let mut block = vec![7; words::<Word>(parallel_thinning::scratch_words(naive::size(&image)))];
+            let expected =
+                on_bitmap(&image, |b| parallel_thinning::thin(b, rule, Arena::new(&mut block)).unwrap());
+            for (name, thin) in widths.iter().filter_map(|(name, thin)| Some((name, (*thin)?))) {
+                block.fill(u64::MAX);
+                let found = on_bitmap(&image, |b| thin(b, rule, Arena::new(&mut block)).unwrap());
+                assert!(found == expected, "{name}, {rule:?}, {:?}", naive::size(&image));
+            }
+        }
+    }
+}
+
+#[test]
 fn thinning_of_all_neighbourhoods() {
     for code in 0..512 {
         let bit = |k: i32| code >> k & 1 == 1;
@@ -202,7 +239,7 @@ fn thinning_of_all_neighbourhoods() {
 fn simple_pixels_by_table_and_by_counting() {
     for code in 0..256usize {
         let around = std::array::from_fn(|k| (code >> k & 1) as u8);
-        assert_eq!(thinning::SIMPLE[code], naive::is_simple(around), "{code:08b}");
+        assert_eq!(sequential_thinning::SIMPLE[code], naive::is_simple(around), "{code:08b}");
     }
 }
 
@@ -231,7 +268,7 @@ fn minimal_skeletons_keep_their_topology() {
     for image in images() {
         for rule in RULES {
             let (skeleton, _) = thin(&image, rule);
-            let (thinned, deleted) = on_bitmap(&skeleton, thinning::minimal);
+            let (thinned, deleted) = on_bitmap(&skeleton, sequential_thinning::minimal);
             assert_eq!(thinned, naive::minimal(&skeleton));
             assert_eq!(naive::set(&skeleton).len() - naive::set(&thinned).len(), deleted as usize);
             assert_eq!(naive::topology(&thinned), naive::topology(&skeleton));
@@ -244,6 +281,17 @@ fn grey_rows(width: usize, height: usize, seed: u64) -> Vec<Vec<u8>> {
     (0..height).map(|_| (0..width).map(|_| random.below(256) as u8).collect()).collect()
 }
 
+/// The loop that boards run, with bytes taken from bytes one by one.
+fn median_row_by_fours(above: &[u8], here: &[u8], below: &[u8], out: &mut [u8]) {
+    let excess = |a: u32, b: u32| {
+        let (a, b) = (a.to_le_bytes(), b.to_le_bytes());
+        u32::from_le_bytes(std::array::from_fn(|k| a[k].saturating_sub(b[k])))
+    };
+    binarise::median_row_by_fours([above, here, below], out, excess);
+}
+
+const MEDIANS: [MedianRow; 2] = [binarise::median_row, median_row_by_fours];
+
 #[test]
 fn medians() {
     for width in 1..=97 {
@@ -251,11 +299,31 @@ fn medians() {
         let (size, stride) = (Size::new(width, rows.len()).unwrap(), width + 3);
         let data: Vec<u8> = rows.iter().flat_map(|r| r.iter().copied().chain([255; 3])).collect();
         let mut buffer = vec![1; size.pixels()];
-        let median =
-            binarise::median(Grey::new(size, stride, &data).unwrap(), &mut buffer, binarise::median_row)
-                .unwrap();
-        let got: Vec<Vec<u8>> = (0..size.height).map(|v| median.row(v).to_vec()).collect();
-        assert_eq!(got, naive::median(&rows));
+        for median_row in MEDIANS {
+            let grey = Grey::new(size, stride, &data).unwrap();
+            let median = binarise::median(grey, &mut buffer, median_row).unwrap();
+            let got: Vec<Vec<u8>> = (0..size.height).map(|v| median.row(v).to_vec()).collect();
+            assert_eq!(got, naive::median(&rows));
+        }
+    }
+}
+
+#[test]
+fn medians_of_rows_of_any_lengths() {
+    let mut random = Random(8);
+    for case in 0..20_000 {
+        let lengths: [usize; 4] = std::array::from_fn(|_| random.below(15) as usize);
+        let rows: [Vec<u8>; 3] =
+            std::array::from_fn(|k| (0..lengths[k]).map(|_| random.below(256) as u8).collect());
+        let columns = lengths[0].min(lengths[1]).min(lengths[2]);
+        let whole = naive::median(&rows.each_ref().map(|row| row[..columns].to_vec()));
+        let filled = columns.min(lengths[3]);
+        for median_row in MEDIANS {
+            let mut out = vec![7; lengths[3]];
+            median_row(&rows[0], &rows[1], &rows[2], &mut out);
+            assert_eq!(out[..filled], whole[1][..filled], "case {case}");
+            assert!(out[filled..].iter().all(|&value| value == 7), "case {case}");
+        }
     }
 }
 
@@ -395,25 +463,33 @@ fn too_little_memory_is_an_error() {
     let mut data = vec![0; size.pixels()];
     let mut parabolas = vec![Parabola::default(); distance::scratch_parabolas(size.width)];
     on_bitmap(&image, |b| {
-        refused(clean::keep_largest(b, &mut vec![0; clean::scratch_words(size) - 1]).map(drop));
-        refused(clean::fill_holes(b, 60, &mut vec![0; clean::scratch_words(size) - 1]).map(drop));
+        let mut block = vec![0; clean::scratch_words(size) - 1];
+        refused(clean::keep_largest(b, Arena::new(&mut block)).map(drop));
+        refused(clean::fill_holes(b, 60, Arena::new(&mut block)).map(drop));
         refused(distance::distance(b, &mut data[1..], &mut parabolas).map(drop));
         refused(distance::distance(b, &mut data, &mut parabolas[1..]).map(drop));
         let mut row = vec![0; size.width - 1];
         refused(distance::squared_distances(b, &mut data, &mut parabolas, &mut row, |_, _| ()));
         refused(boundary::boundary(b, Element::Square, &mut [0; 3]).map(drop));
         refused(hull::convex_hull(hull::bitmap_extents(b), &mut List::<_, 5>::new()));
-        let mut block = vec![0; words::<Word>(thinning::scratch_words(size)) - 1];
         let plane = distance::distance(b, &mut data, &mut parabolas).unwrap();
         for rule in RULES {
-            refused(thinning::thin(b, rule, &plane, Arena::new(&mut block)).map(drop));
+            let enough = match rule {
+                Rule::EdtOrdered => words::<u32>(sequential_thinning::scratch_order(b.count(), 16)),
+                _ => words::<Word>(parallel_thinning::scratch_words(size)),
+            };
+            let mut block = vec![0; enough - 1];
+            refused(
+                thinning::thin(b, (rule, parallel_thinning::thin), &plane, Arena::new(&mut block)).map(drop),
+            );
         }
     });
     on_bitmap(&image, |b| {
         // Distances of another size read as 0 outside: a worse order, no panic.
         let plane = Plane::over(Size::new(7, 3).unwrap(), &mut data).unwrap();
-        let mut block = vec![0; words::<u32>(thinning::scratch_order(b.count(), u16::MAX))];
-        thinning::thin(b, Rule::EdtOrdered, &plane, Arena::new(&mut block)).unwrap();
+        let mut block = vec![0; words::<u32>(sequential_thinning::scratch_order(b.count(), u16::MAX))];
+        thinning::thin(b, (Rule::EdtOrdered, parallel_thinning::thin), &plane, Arena::new(&mut block))
+            .unwrap();
     });
     let grey = Grey::new(size, size.width, &[0; 4800]).unwrap();
     refused(binarise::median(grey, &mut [0; 4799], binarise::median_row).map(drop));
@@ -437,12 +513,12 @@ fn specks_cost_only_their_own_rows() {
         ("comb", picture(&|u, v| u % 2 == 0 || v == if u % 4 == 1 { 0 } else { side - 1 })),
         ("spiral", spiral(side)),
     ] {
-        let mut scratch = vec![0; clean::scratch_words(naive::size(&image))];
+        let mut block = vec![0; clean::scratch_words(naive::size(&image))];
         on_bitmap(&image, |b| {
             let start = std::time::Instant::now();
-            clean::fill_holes(b, 60, &mut scratch).unwrap();
+            clean::fill_holes(b, 60, Arena::new(&mut block)).unwrap();
             let holes = start.elapsed();
-            let found = clean::keep_largest(b, &mut scratch).unwrap();
+            let found = clean::keep_largest(b, Arena::new(&mut block)).unwrap();
             let all = start.elapsed();
             println!("{name}: {found:?}, holes {holes:?}, both {all:?}");
             assert!(all.as_secs() < 5, "{name} took {all:?}");

@@ -1,5 +1,7 @@
 //! Runs the core on pairs from a file, on an emulated board, and says what each stage makes and costs.
 //!
+//! Each pair in the smallest of the firmware's memories that takes pictures of its size.
+//!
 //! `stages PAIRS`: for each pair six numbers (i32, little endian) and two grey pictures, the left one first:
 //! width, height, focal length (1/256 px), offset of disparities (1/256 px), median filter and so on as the
 //! device has them (1) or all that the core can (0), and 0. Prints a line a stage: the number of the pair,
@@ -9,7 +11,7 @@
 #[cfg(target_os = "none")]
 mod board {
     use firmware::board::mps2::{Board, Timer, argument};
-    use firmware::memory::{Capacities, Qvga, Storage, Vga};
+    use firmware::memory::{Capacities, Qvga, Small, Storage, Vga};
     use firmware::stages::{Stages, run};
     use semihosting::fs::File;
     use semihosting::io::Read;
@@ -17,7 +19,7 @@ mod board {
     use shared::bitmap::{Grey, Size};
     use shared::pipeline::{Memory, Settings, scratch_words};
     use shared::stage::depth::Optics;
-    use shared::stage::thinning::scratch_order;
+    use shared::stage::sequential_thinning::scratch_order;
     use static_cell::ConstStaticCell;
 
     const LARGEST: Capacities = Vga::CAPACITIES;
@@ -25,6 +27,7 @@ mod board {
     const ORDER: usize = scratch_order(LARGEST.size.pixels() * 6 / 10, u16::MAX >> 2);
     const SCRATCH: usize = scratch_words(LARGEST.size, LARGEST.points, LARGEST.controls, ORDER);
 
+    static SMALL: ConstStaticCell<Small> = ConstStaticCell::new(Small::new());
     static QVGA: ConstStaticCell<Qvga> = ConstStaticCell::new(Qvga::new());
     static VGA: ConstStaticCell<Vga> = ConstStaticCell::new(Vga::new());
     static ALL_SCRATCH: ConstStaticCell<[u64; SCRATCH]> = ConstStaticCell::new([0; SCRATCH]);
@@ -69,7 +72,8 @@ mod board {
         let timer = Board::take().expect("taken once").timer;
         let mut file = argument();
 
-        let (qvga, vga, scratch, pictures) = (QVGA.take(), VGA.take(), ALL_SCRATCH.take(), PICTURES.take());
+        let (small, qvga, vga) = (SMALL.take(), QVGA.take(), VGA.take());
+        let (scratch, pictures) = (ALL_SCRATCH.take(), PICTURES.take());
         let mut number = 0;
         while let Some(header) = header(&mut file) {
             let size = header.size;
@@ -78,7 +82,13 @@ mod board {
             }
             let pair = pictures.each_ref().map(|bytes| Grey::new(size, size.width, bytes).expect("checked"));
             let fits = |c: Capacities| size.width <= c.size.width && size.height <= c.size.height;
-            let mut memory = if fits(Qvga::CAPACITIES) { qvga.lend() } else { vga.lend() };
+            let mut memory = if fits(Small::CAPACITIES) {
+                small.lend()
+            } else if fits(Qvga::CAPACITIES) {
+                qvga.lend()
+            } else {
+                vga.lend()
+            };
             if !header.as_device {
                 memory.scratch = scratch;
             }

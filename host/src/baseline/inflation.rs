@@ -15,9 +15,9 @@ use nalgebra::Point3;
 
 use super::Outline;
 use crate::mesh::Mesh;
-use crate::mesh::body::keep_largest_body;
+use crate::mesh::body::Bodies;
 use crate::stage::rectify::RectifiedCamera;
-use crate::stage::solid::{SolidBall, outermost, spheres};
+use crate::stage::solid::{Outermost, SolidBall, spheres};
 use crate::stage::surface::surface;
 
 /// The left outline inflated, in cells of `cell` mm; empty if the centroids lie behind the cameras.
@@ -32,7 +32,11 @@ pub fn inflation([left, right]: [&Outline; 2], camera: &RectifiedCamera, cell: f
         at: at.coords,
         place,
     };
-    let balls: Vec<SolidBall> = left.pixels().enumerate().map(ball).filter(|b| b.radius > 0.0).collect();
-    let inflated = surface(&spheres(&outermost(&balls, pixel)), cell);
-    inflated.map(|mesh| keep_largest_body(&mesh).mesh).unwrap_or_default()
+    let mut balls: Vec<SolidBall> = left.pixels().enumerate().map(ball).filter(|b| b.radius > 0.0).collect();
+    Outermost::default().keep(&mut balls, pixel);
+    let mut cones = Vec::new();
+    spheres(&balls, &mut cones);
+    let mut inflated = surface(&cones, cell).unwrap_or_default();
+    Bodies::default().keep_largest(&mut inflated);
+    inflated
 }

@@ -59,6 +59,7 @@ pub struct Camera {
 impl Camera {
     /// The pixel that sees the ray (x, y, 1).
     #[must_use]
+    #[inline]
     pub fn pixel_of(&self, ray: Point2<f64>) -> Point2<f64> {
         let p = self.distortion.apply(ray);
         Point2::new(self.fx * p.x + self.skew * p.y + self.cx, self.fy * p.y + self.cy)

@@ -12,12 +12,13 @@ use rayon::{ThreadPoolBuildError, ThreadPoolBuilder};
 /// Threads a core that are of any use.
 const MOST_A_CORE: usize = 4;
 
-/// Does the jobs 0 to `count` on `threads` threads, by default one a core, at most [`MOST_A_CORE`] a core.
-/// Results in the order of the jobs.
-pub(super) fn run<T: Send>(
+/// Does the jobs 0 to `count` on `threads` threads, by default one a core, at most [`MOST_A_CORE`] a core. Each
+/// worker has a bench of its own, which a job finds as the worker's last one left it. Results in the order of the
+/// jobs.
+pub(super) fn run<B: Default + Send, T: Send>(
     count: usize,
     threads: Option<usize>,
-    job: &(impl Fn(usize) -> T + Sync),
+    job: &(impl Fn(&mut B, usize) -> T + Sync),
 ) -> Result<Vec<T>, ThreadPoolBuildError> {
     let cores = thread::available_parallelism().map_or(1, usize::from);
     let threads = threads.unwrap_or_else(rayon::current_num_threads).clamp(1, MOST_A_CORE * cores);
@@ -32,12 +33,13 @@ pub(super) fn run<T: Send>(
     thread::scope(|scope| {
         for pool in &pools {
             scope.spawn(|| {
+                let mut bench = B::default();
                 loop {
                     let index = next.fetch_add(1, Ordering::Relaxed);
                     if index >= count {
                         break;
                     }
-                    let result = pool.install(|| job(index));
+                    let result = pool.install(|| job(&mut bench, index));
                     // A lock is poisoned only by a panic, which the scope passes on.
                     if let Ok(mut results) = results.lock() {
                         results.push((index, result));
@@ -58,9 +60,13 @@ mod tests {
     #[test]
     fn results_come_in_order_whatever_the_threads() {
         for threads in [None, Some(1), Some(3), Some(8), Some(65_535)] {
-            let squares = run(5, threads, &|index| index * index).unwrap();
+            let squares = run(5, threads, &|(): &mut (), index| index * index).unwrap();
             assert_eq!(squares, [0, 1, 4, 9, 16]);
-            assert_eq!(run(0, threads, &|index| index).unwrap(), [0usize; 0]);
+            assert_eq!(run(0, threads, &|(): &mut (), index| index).unwrap(), [0usize; 0]);
+            // A bench is one worker's, and each of its jobs finds it as the last one left it.
+            let count = |done: &mut usize, _| std::mem::replace(done, *done + 1);
+            let firsts = run(20, threads, &count).unwrap().into_iter().filter(|done| *done == 0).count();
+            assert!((1..=threads.unwrap_or(20)).contains(&firsts), "{firsts}");
         }
     }
 }

@@ -72,7 +72,7 @@ struct Rows {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let measured = find(&args.check, args.layout).map_err(Failure::from).and_then(|found| {
         let pairs = found.pairs;
-        let rows = batch::run(pairs.len(), None, &|index| measure(args, &pairs[index]))?;
+        let rows = batch::run(pairs.len(), None, &|(): &mut (), index| measure(args, &pairs[index]))?;
         if rows.iter().any(Result::is_ok) {
             return Ok((pairs, rows));
         }

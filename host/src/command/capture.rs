@@ -104,6 +104,12 @@ pub struct Args {
     /// Draw no pictures of the stages
     #[arg(long)]
     no_pictures: bool,
+    /// Tell on standard error how long each stage took
+    #[arg(long, conflicts_with = "only_record")]
+    timings: bool,
+    /// Leave report.html as well, a page that shows all of it in a browser
+    #[arg(long, conflicts_with = "only_record")]
+    report: bool,
     /// Print one JSON document at the end instead of text
     #[arg(long)]
     json: bool,

@@ -16,13 +16,14 @@ use std::time::Instant;
 use nalgebra::Vector3;
 use serde_json::json;
 
-use super::model::{self, Model, Order};
+use super::model::{self, Model, Order, Place};
 use super::scene::{Scene, write};
 use super::table::Table;
 use super::{Failure, evaluate, say, say_json};
 use crate::calibration::StereoCamera;
 use crate::evaluate::{Evaluation, Options};
-use crate::reconstruct;
+use crate::mesh::Mesh;
+use crate::reconstruct::{self, Workspace};
 use crate::shape::Shape;
 use crate::view::Calibrated;
 
@@ -59,23 +60,23 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     write(&folder, &scene)?;
     let rendered = start.elapsed();
     let [left, right] = [0, 1].map(|eye| scene.images[eye].clone());
-    let model = model::make(Order {
+    let order = Order {
         images: [left, right],
         calibration: &scene.calibration,
         options: &reconstruct::Options::default(),
         pictures: true,
-        page: (!args.no_report).then_some(shape.name()),
         truth: Some(&scene.truth),
-        folder: &folder,
-    })?;
-    let found = measure(&model, &scene);
+        place: Place { folder: &folder, report: args.json, page: !args.no_report },
+    };
+    let (model, made) = model::make_and_keep(order, &mut Workspace::default())?;
+    let found = measure(&made.mesh, &scene);
     if args.json {
         return say_json(&json!({
             "shape": shape.name(),
             "folder": folder,
-            "size_mm": <[f64; 3]>::from(model.size()),
+            "size_mm": <[f64; 3]>::from(model.size),
             "size_error_mm": size_error(&model, &scene),
-            "warnings": model.warnings(),
+            "warnings": &model.warnings,
             "evaluation": found,
             "report": model.report,
         }));
@@ -85,8 +86,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let [width, height, depth] = size_error(&model, &scene);
     table.row("size error", &format!("{width:+.1} mm wide, {height:+.1} high, {depth:+.1} deep"));
     evaluate::tell(&found, &mut table);
-    for warning in model.warnings() {
-        table.row("warning", &warning);
+    for warning in &model.warnings {
+        table.row("warning", warning);
     }
     let [all, rendered, made] = [start.elapsed(), rendered, model.time].map(|time| time.as_secs_f64());
     table.row(
@@ -97,16 +98,16 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     say(table.text())
 }
 
-fn measure(model: &Model, scene: &Scene) -> Evaluation {
+fn measure(model: &Mesh, scene: &Scene) -> Evaluation {
     let options = Options { samples: SAMPLES, ..Options::default() };
     let views = Calibrated::pair(&scene.calibration);
-    crate::evaluate::evaluate(&model.reconstruction.mesh, &scene.truth, &views, &options)
+    crate::evaluate::evaluate(model, &scene.truth, &views, &options)
 }
 
 /// By how much the box around the model is larger than that around the shape, mm.
 fn size_error(model: &Model, scene: &Scene) -> [f64; 3] {
     let truth = scene.truth.bounds().map_or_else(Vector3::zeros, |[low, high]| high - low);
-    (model.size() - truth).into()
+    (model.size - truth).into()
 }
 
 /// The error as text, which is what the parser shows.

@@ -33,11 +33,12 @@ use shared::wire::{Decoder, MAX_FRAME, ToDevice};
 use super::connect::{
     PortArgs, check_calibration, hello_as_json, link_as_json, link_in_words, model_of, progress, version,
 };
-use super::model::{self, Model};
+use super::model::{self, Model, Place};
 use super::options::GrowArgs;
 use super::table::{count, sides};
+use super::timings::Timings;
 use super::{Failure, interruption, note, say, words_of};
-use crate::reconstruct::{Options, Refusal};
+use crate::reconstruct::{Options, Refusal, Workspace};
 use crate::report::words::{parse_polarity, parse_threshold};
 use crate::source::serial::inbox::{Hello, Inbox, Message, Pair};
 use crate::source::serial::link::frames;
@@ -75,6 +76,12 @@ pub struct Args {
     /// Folder for the results
     #[arg(long, value_name = "DIR", default_value = "ossature-out")]
     out: PathBuf,
+    /// Tell on standard error how long each stage took
+    #[arg(long)]
+    timings: bool,
+    /// Leave report.html as well, a page that shows all of it in a browser
+    #[arg(long)]
+    report: bool,
     /// Print lines of JSON instead of text
     #[arg(long)]
     pub(super) json: bool,
@@ -88,7 +95,8 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let model = model_of(&args.calib)?;
     let options = args.grow.device_options();
-    let mut desk = Desk::new((&model, &options), &args.out, args.json);
+    let wanted = Wanted { page: args.report, json: args.json, timings: args.timings };
+    let mut desk = Desk::new((&model, &options), &args.out, wanted);
     let end = args.seconds.map(|seconds| Instant::now() + Duration::from_secs(seconds.into()));
     let stop = interruption()?;
     let mut session = begin(args, &model, &mut desk)?;
@@ -164,14 +172,25 @@ fn start(args: &Args, session: &mut Session) -> Result<(), SessionError> {
     session.order_cameras(&ToDevice::Start)
 }
 
+/// What is wanted beside the models.
+#[derive(Clone, Copy)]
+pub(super) struct Wanted {
+    /// A page about each.
+    pub(super) page: bool,
+    /// JSON in place of text.
+    pub(super) json: bool,
+    /// How long each stage took.
+    pub(super) timings: bool,
+}
+
 /// Makes the models of a recording again.
 ///
 /// # Errors
 ///
 /// If the recording cannot be read, or no pair gives a model.
-pub(super) fn replay(path: &Path, options: &Options, out: &Path, json: bool) -> Result<(), Failure> {
+pub(super) fn replay(path: &Path, options: &Options, out: &Path, wanted: Wanted) -> Result<(), Failure> {
     let recording = Recording::read(path)?;
-    let mut desk = Desk::new((&recording.calibration, options), out, json);
+    let mut desk = Desk::new((&recording.calibration, options), out, wanted);
     let (mut inbox, mut tally) = (Inbox::new()?, Tally::default());
     for (k, bytes) in recording.connections.iter().enumerate() {
         let mut buffer = vec![0; MAX_FRAME];
@@ -202,7 +221,11 @@ struct Desk<'a> {
     model: &'a PairModel,
     options: &'a Options,
     out: &'a Path,
+    page: bool,
     json: bool,
+    /// If they are wanted.
+    timings: Option<Timings>,
+    workspace: Workspace,
     bar: ProgressBar,
     start: Instant,
     pairs: u32,
@@ -210,9 +233,11 @@ struct Desk<'a> {
 }
 
 impl<'a> Desk<'a> {
-    fn new((model, options): (&'a PairModel, &'a Options), out: &'a Path, json: bool) -> Self {
-        let (bar, start) = (progress(), Instant::now());
-        Self { model, options, out, json, bar, start, pairs: 0, models: 0 }
+    fn new((model, options): (&'a PairModel, &'a Options), out: &'a Path, wanted: Wanted) -> Self {
+        let (bar, start, workspace) = (progress(), Instant::now(), Workspace::default());
+        let timings = wanted.timings.then(Timings::begin);
+        let Wanted { page, json, .. } = wanted;
+        Self { model, options, out, page, json, timings, workspace, bar, start, pairs: 0, models: 0 }
     }
 
     /// A line to standard error.
@@ -247,10 +272,14 @@ impl<'a> Desk<'a> {
         self.pairs += 1;
         let folder = self.out.join(format!("{:06}", self.pairs));
         let told = heading(&pair);
-        match model::receive((inbox, *pair), self.model, self.options, &folder) {
+        let place = Place { folder: &folder, report: self.json, page: self.page };
+        match model::receive((inbox, *pair), self.model, self.options, place, &mut self.workspace) {
             Ok(model) => {
                 self.models += 1;
-                let warnings = model.warnings();
+                if let Some(timings) = &mut self.timings {
+                    timings.add(None, &model);
+                }
+                let warnings = &model.warnings;
                 self.line(
                     || {
                         let (mut told, more) = (
@@ -260,7 +289,7 @@ impl<'a> Desk<'a> {
                         merge(&mut told, more);
                         told
                     },
-                    || described(&told, &model, &warnings, &folder),
+                    || described(&told, &model, warnings, &folder),
                 )
             }
             Err(failure) if failure.is::<Refusal>() => {
@@ -288,6 +317,9 @@ impl<'a> Desk<'a> {
 
     fn close(self, tally: &Tally) -> Result<(), Failure> {
         self.bar.finish_and_clear();
+        if let Some(timings) = &self.timings {
+            timings.tell();
+        }
         let (models, pairs) = (self.models, self.pairs);
         self.line(
             || json!({ "pairs": pairs, "models": models, "link": link_as_json(tally) }),
@@ -327,7 +359,7 @@ fn merge(into: &mut Value, from: Value) {
 }
 
 fn described(told: &Value, model: &Model, warnings: &[String], folder: &Path) -> String {
-    let (pair, size, folder) = (&told["pair"], sides(model.size()), folder.display());
+    let (pair, size, folder) = (&told["pair"], sides(model.size), folder.display());
     let mut text = format!("pair {pair}: {size}: {folder}");
     for warning in warnings {
         text.push_str(&format!("\n  warning: {warning}"));

@@ -36,6 +36,7 @@ pub mod render;
 pub mod replay;
 mod scene;
 mod table;
+mod timings;
 
 use std::error::Error;
 use std::io::{self, Write};

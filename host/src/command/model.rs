@@ -14,9 +14,10 @@ use super::table::{Table, count, percent, sides};
 use crate::calibration::StereoCamera;
 use crate::mesh::Mesh;
 use crate::output;
-use crate::reconstruct::{Options, Reconstruction, Refusal, describe, reconstruct, reconstruct_shape};
+use crate::reconstruct::{Options, Reconstruction, Refusal, Workspace, describe};
 use crate::report::record::Record;
-use crate::report::{Run, numbers, words};
+use crate::report::times::{self, Stage};
+use crate::report::{Run, words};
 use crate::source::serial::inbox::{Inbox, Message, Pair};
 
 /// All that a model comes from.
@@ -26,32 +27,58 @@ pub(super) struct Order<'a> {
     pub(super) options: &'a Options,
     /// Whether to draw the stages.
     pub(super) pictures: bool,
-    /// What a page about it is called, if there is to be one.
-    pub(super) page: Option<&'a str>,
     /// The true surface, to be shown beside the model.
     pub(super) truth: Option<&'a Mesh>,
-    /// Where the results go.
-    pub(super) folder: &'a Path,
+    pub(super) place: Place<'a>,
 }
 
-/// What has come of it.
+/// Where results go.
+#[derive(Clone, Copy)]
+pub(super) struct Place<'a> {
+    pub(super) folder: &'a Path,
+    /// Whether the report is wanted here as well.
+    pub(super) report: bool,
+    /// Whether there is to be a page about it.
+    pub(super) page: bool,
+}
+
+/// What is told of a model; its surface is in its file alone.
 pub(super) struct Model {
-    pub(super) reconstruction: Reconstruction,
-    /// As in `report.json`.
+    /// The box around it, mm.
+    pub(super) size: Vector3<f64>,
+    /// From the left camera, mm.
+    distance: f64,
+    vertices: usize,
+    faces: usize,
+    /// Everything that the user should know, in words.
+    pub(super) warnings: Vec<String>,
+    /// As in `report.json`, if it is wanted.
     pub(super) report: serde_json::Value,
+    pub(super) stages: Vec<Stage>,
+    /// For its files.
+    pub(super) writing: Duration,
     /// From images to files.
     pub(super) time: Duration,
 }
 
 /// Reconstructs and writes.
-pub(super) fn make(order: Order<'_>) -> Result<Model, Failure> {
+pub(super) fn make(order: Order<'_>, workspace: &mut Workspace) -> Result<Model, Failure> {
+    let (model, made) = make_and_keep(order, workspace)?;
+    workspace.recycle(made);
+    Ok(model)
+}
+
+/// Reconstructs and writes, and keeps what was made.
+pub(super) fn make_and_keep(
+    order: Order<'_>,
+    workspace: &mut Workspace,
+) -> Result<(Model, Reconstruction), Failure> {
     let start = Instant::now();
-    let Order { images: [left, right], calibration, options, truth, .. } = order;
+    let Order { images, calibration, options, truth, .. } = order;
     let mut record = if order.pictures { Record::new() } else { Record::figures_only() };
-    let reconstruction = reconstruct(left, right, calibration, options, &mut record)?;
-    let run = Run { calibration, options, reconstruction: &reconstruction, record: &record, truth };
-    let report = written(order.folder, &run, order.page)?;
-    Ok(Model { reconstruction, report, time: start.elapsed() })
+    let made = workspace.reconstruct(images.each_ref(), calibration, options, &mut record)?;
+    let run = Run { calibration, options, reconstruction: &made, record: &record, truth };
+    Ok((Model::written(order.place, &run, start)?, made))
 }
 
 /// Reconstructs and writes what a device of this calibration would send of the images.
@@ -59,7 +86,8 @@ pub(super) fn make_as_device(
     [left, right]: [GrayImage; 2],
     calibration: &StereoCamera,
     options: &Options,
-    folder: &Path,
+    place: Place<'_>,
+    workspace: &mut Workspace,
 ) -> Result<Model, Failure> {
     let start = Instant::now();
     let (device, bytes) = describe(left, right, calibration, options)?;
@@ -70,7 +98,7 @@ pub(super) fn make_as_device(
     let Some(Message::Pair(pair)) = pair.transpose()? else {
         return Err("the frame of a pair was lost on its way through memory".into());
     };
-    let model = receive((&mut inbox, *pair), &device, options, folder)?;
+    let model = receive((&mut inbox, *pair), &device, options, place, workspace)?;
     Ok(Model { time: start.elapsed(), ..model })
 }
 
@@ -79,7 +107,8 @@ pub(super) fn receive(
     (inbox, pair): (&mut Inbox, Pair),
     model: &PairModel,
     options: &Options,
-    folder: &Path,
+    place: Place<'_>,
+    workspace: &mut Workspace,
 ) -> Result<Model, Failure> {
     let start = Instant::now();
     let outcome = pair.result.map_err(Refusal::from)?;
@@ -87,37 +116,39 @@ pub(super) fn receive(
     for (k, eye) in record.eyes.iter_mut().enumerate() {
         (eye.parts.level, eye.parts.area) = (pair.levels[k], outcome.areas[k] as usize);
     }
-    let reconstruction = reconstruct_shape(&mut inbox.memory(), outcome, model, options, &mut record)?;
+    let made = workspace.reconstruct_shape((&mut inbox.memory(), outcome), model, options, &mut record)?;
     let calibration = &model.into();
-    let run = Run { calibration, options, reconstruction: &reconstruction, record: &record, truth: None };
-    let report = written(folder, &run, None)?;
-    Ok(Model { reconstruction, report, time: start.elapsed() })
-}
-
-/// Writes all files of a run; returns its report.
-fn written(folder: &Path, run: &Run<'_>, page: Option<&str>) -> Result<serde_json::Value, Failure> {
-    output::write(folder, run, page)?;
-    Ok(serde_json::from_slice(&numbers::json(run))?)
+    let run = Run { calibration, options, reconstruction: &made, record: &record, truth: None };
+    let told = Model::written(place, &run, start)?;
+    workspace.recycle(made);
+    Ok(told)
 }
 
 impl Model {
-    /// The box around the model, mm.
-    pub(super) fn size(&self) -> Vector3<f64> {
-        self.reconstruction.mesh.bounds().map_or_else(Vector3::zeros, |[low, high]| high - low)
-    }
-
-    /// Everything that the user should know, in words.
-    pub(super) fn warnings(&self) -> Vec<String> {
-        warnings(&self.reconstruction)
+    /// Writes all files of a run that began at `start`.
+    fn written(place: Place<'_>, run: &Run<'_>, start: Instant) -> Result<Self, Failure> {
+        let begun = Instant::now();
+        let report = output::write(place.folder, run, place.page)?;
+        let mesh = &run.reconstruction.mesh;
+        let bounds = mesh.bounds();
+        Ok(Self {
+            size: bounds.map_or_else(Vector3::zeros, |[low, high]| high - low),
+            distance: bounds.map_or(0.0, |[low, high]| nalgebra::center(&low, &high).coords.norm()),
+            vertices: mesh.vertices.len(),
+            faces: mesh.faces.len(),
+            warnings: warnings(run.reconstruction),
+            report: if place.report { serde_json::from_slice(&report)? } else { serde_json::Value::Null },
+            stages: times::stages(run),
+            writing: begun.elapsed(),
+            time: start.elapsed(),
+        })
     }
 
     /// Adds what people want to know to a table.
     pub(super) fn tell(&self, table: &mut Table) {
-        let mesh = &self.reconstruction.mesh;
-        let distance = mesh.bounds().map_or(0.0, |[low, high]| nalgebra::center(&low, &high).coords.norm());
-        table.row("size", &sides(self.size()));
-        table.row("distance", &format!("{distance:.0} mm from the left camera"));
-        table.row("model", &format!("{} vertices, {} faces", mesh.vertices.len(), mesh.faces.len()));
+        table.row("size", &sides(self.size));
+        table.row("distance", &format!("{:.0} mm from the left camera", self.distance));
+        table.row("model", &format!("{} vertices, {} faces", self.vertices, self.faces));
     }
 }
 

@@ -15,6 +15,9 @@
 //! boundary.ply, report.json and pictures of every stage. What does not give a trustworthy model is
 //! refused with the reason, and leaves no files; the other pairs go on.
 //!
+//! Pairs are made side by side, one a core; --timings tells where their time goes. Undisturbed times are those of
+//! --jobs 1.
+//!
 //! --as-device makes of pictures what a camera device would make of them and send (`host listen`).
 //!
 //! INPUT may also be a recording of a camera device (`host listen --record`), which gives the models that it
@@ -30,16 +33,19 @@
 
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use image::GrayImage;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 
-use super::model::{self, Model, Order};
+use super::listen::Wanted;
+use super::model::{self, Model, Order, Place};
 use super::options::{CameraArgs, MethodArgs, SceneArgs, usage};
 use super::table::Table;
+use super::timings::Timings;
 use super::{Failure, batch, listen, note, say, say_json, told, told_in_line, words_of};
-use crate::reconstruct::Options;
+use crate::reconstruct::{Options, Workspace};
 use crate::source::find::{Found, find};
 use crate::source::scene::Scene;
 use crate::source::serial::recording::is_recording;
@@ -76,6 +82,12 @@ pub struct Args {
     /// Draw no pictures of the stages
     #[arg(long)]
     no_pictures: bool,
+    /// Tell on standard error how long each stage took
+    #[arg(long)]
+    timings: bool,
+    /// Leave report.html as well, a page that shows all of it in a browser
+    #[arg(long)]
+    report: bool,
     /// Print one JSON document instead of text
     #[arg(long)]
     json: bool,
@@ -90,6 +102,8 @@ struct Done<'a> {
 
 struct Success {
     model: Model,
+    /// For its images.
+    loading: Duration,
     warnings: Vec<String>,
     /// The calibration, if it was found beside the images.
     calibration: Option<PathBuf>,
@@ -105,7 +119,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         && is_recording(Path::new(input))
     {
         let options = recording_options(args)?;
-        return told_in_line(args.json, listen::replay(Path::new(input), &options, &args.out, args.json));
+        let wanted = Wanted { page: args.report, json: args.json, timings: args.timings };
+        return told_in_line(args.json, listen::replay(Path::new(input), &options, &args.out, wanted));
     }
     let mut options = if args.as_device { args.method.device_options() } else { args.method.options() }?;
     let one_file = args.layout.filter(|layout| *layout != Layout::Two);
@@ -114,7 +129,13 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if args.scene.takes_first() {
         scene.background = Some(told(args.json, first(args, &mut found))?);
     }
+    let mut timings = Timings::begin();
     let done = told(args.json, all(args, &options, &scene, &found))?;
+    if args.timings {
+        let made = done.iter().filter_map(|done| done.result.as_ref().ok());
+        made.for_each(|success| timings.add(Some(success.loading), &success.model));
+        timings.tell();
+    }
     if args.json {
         say_json(&as_json(&done, &found))?;
     } else {
@@ -177,10 +198,11 @@ fn all<'a>(
     if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} pairs, {eta} left") {
         bar.set_style(style);
     }
-    let job = |index: usize| {
+    let job = |workspace: &mut Workspace, index: usize| {
         let pair = &pairs[index];
         let folder = if found.single { args.out.clone() } else { args.out.join(&pair.name) };
-        let result = one(args, options, scene, pair, &folder).map_err(|failure| with_guess(pair, failure));
+        let result = one(args, options, scene, (pair, &folder), workspace);
+        let result = result.map_err(|failure| with_guess(pair, failure));
         bar.inc(1);
         Done { pair, folder, result }
     };
@@ -193,9 +215,10 @@ fn one(
     args: &Args,
     options: &Options,
     scene: &Scene,
-    pair: &Pair,
-    folder: &Path,
+    (pair, folder): (&Pair, &Path),
+    workspace: &mut Workspace,
 ) -> Result<Success, Failure> {
+    let start = Instant::now();
     let mut views = pair.load()?;
     if args.swap {
         views.images.reverse();
@@ -204,17 +227,18 @@ fn one(
     let make = || {
         let (calibration, beside) = args.cameras.of(pair, &images[0])?;
         let (images, calibration) = scene.apply(images, &calibration)?;
+        let (loading, place) = (start.elapsed(), Place { folder, report: args.json, page: args.report });
         if args.as_device {
-            return Ok((model::make_as_device(images, &calibration, options, folder)?, beside));
+            let model = model::make_as_device(images, &calibration, options, place, workspace)?;
+            return Ok((loading, model, beside));
         }
         let pictures = !args.no_pictures;
-        let order =
-            Order { images, calibration: &calibration, options, pictures, page: None, truth: None, folder };
-        Ok((model::make(order)?, beside))
+        let order = Order { images, calibration: &calibration, options, pictures, truth: None, place };
+        Ok((loading, model::make(order, workspace)?, beside))
     };
-    let (model, calibration) = make().map_err(|failure| with_warnings(&warnings, failure))?;
-    let warnings = warnings.into_iter().chain(model.warnings()).collect();
-    Ok(Success { model, warnings, calibration })
+    let (loading, model, calibration) = make().map_err(|failure| with_warnings(&warnings, failure))?;
+    let warnings = warnings.into_iter().chain(model.warnings.iter().cloned()).collect();
+    Ok(Success { model, loading, warnings, calibration })
 }
 
 /// A failure, with what was suspicious about the files.
@@ -266,7 +290,7 @@ fn as_text(done: &[Done<'_>], found: &Found) -> String {
 
 fn as_json(done: &[Done<'_>], found: &Found) -> serde_json::Value {
     let pair = |Done { pair, folder, result }: &Done<'_>| match result {
-        Ok(Success { model, warnings, calibration }) => json!({
+        Ok(Success { model, warnings, calibration, .. }) => json!({
             "name": pair.name,
             "folder": folder,
             "calibration_found": calibration,

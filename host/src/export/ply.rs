@@ -39,14 +39,18 @@ pub fn write_mesh(path: &Path, mesh: &Mesh, comments: &[&str]) -> Result<(), Exp
         begin(file, comments, mesh.vertices.len())?;
         writeln!(file, "element face {}", mesh.faces.len())?;
         writeln!(file, "property list uchar int vertex_indices\nend_header")?;
+        let mut records = Vec::with_capacity(mesh.vertices.len() * 12 + mesh.faces.len() * 13);
         for vertex in &mesh.vertices {
-            floats(file, vertex.iter())?;
+            records.extend_from_slice(
+                [vertex.x, vertex.y, vertex.z].map(|x| (x as f32).to_le_bytes()).as_flattened(),
+            );
         }
         for face in &mesh.faces {
-            file.write_all(&[3])?;
-            indices(file, face)?;
+            let mut record = [3; 13];
+            record[1..].copy_from_slice(face.map(u32::to_le_bytes).as_flattened());
+            records.extend_from_slice(&record);
         }
-        Ok(())
+        file.write_all(&records)
     })
 }
 

@@ -5,83 +5,113 @@
 
 use super::Mesh;
 
-/// What [`keep_largest_body`] left.
-#[derive(Clone, Debug, PartialEq)]
-pub struct LargestBody {
-    /// The largest body, without hollows.
-    pub mesh: Mesh,
-    /// How many other bodies were dropped.
-    pub dropped: usize,
+/// What [`Bodies::keep_largest`] dropped.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Dropped {
+    /// How many bodies.
+    pub bodies: usize,
     /// Their share of the volume of all bodies, 0 to 1.
-    pub dropped_volume: f64,
+    pub volume: f64,
 }
 
-/// Keeps the body of greatest volume of a closed mesh, and nothing else: not its hollows either.
-#[must_use]
-pub fn keep_largest_body(mesh: &Mesh) -> LargestBody {
-    let (of_face, count) = pieces(mesh);
-    let mut volumes = vec![0.0; count];
-    for (face, &piece) in of_face.iter().enumerate() {
-        volumes[piece] += mesh.volume_under(face);
+/// Finds the bodies of one mesh after the other, and allocates nothing once its lists are long enough.
+#[derive(Debug, Default)]
+pub struct Bodies {
+    /// The connected piece of each vertex.
+    piece: Vec<u32>,
+    /// Of each piece.
+    volumes: Vec<f64>,
+    /// Where each vertex goes.
+    moved: Vec<u32>,
+    /// The mesh that is put together.
+    kept: Mesh,
+}
+
+/// Of a vertex that goes nowhere.
+const NOWHERE: u32 = u32::MAX;
+
+impl Bodies {
+    /// Keeps the body of greatest volume of a closed mesh, and nothing else: not its hollows either.
+    pub fn keep_largest(&mut self, mesh: &mut Mesh) -> Dropped {
+        let count = self.find_pieces(mesh);
+        if count <= 1 {
+            return Dropped::default();
+        }
+        let of_face = |face: usize| self.piece[mesh.faces[face][0] as usize] as usize;
+        self.volumes.clear();
+        self.volumes.resize(count, 0.0);
+        for face in 0..mesh.faces.len() {
+            self.volumes[of_face(face)] += mesh.volume_under(face);
+        }
+        let volumes = &self.volumes;
+        let largest = (1..count).fold(0, |best, i| if volumes[i] >= volumes[best] { i } else { best });
+        let bodies = || volumes.iter().filter(|&&volume| volume > 0.0);
+        let total: f64 = bodies().sum();
+        let dropped = Dropped {
+            bodies: bodies().count().saturating_sub(1),
+            volume: if total > 0.0 { 1.0 - volumes[largest] / total } else { 0.0 },
+        };
+        self.extract(mesh, largest as u32);
+        dropped
     }
-    let Some(largest) = (0..count).max_by(|&a, &b| volumes[a].total_cmp(&volumes[b])) else {
-        return LargestBody { mesh: Mesh::default(), dropped: 0, dropped_volume: 0.0 };
-    };
-    let bodies = || volumes.iter().filter(|&&volume| volume > 0.0);
-    let total: f64 = bodies().sum();
-    LargestBody {
-        mesh: extract(mesh, |face| of_face[face] == largest),
-        dropped: bodies().count().saturating_sub(1),
-        dropped_volume: if total > 0.0 { 1.0 - volumes[largest] / total } else { 0.0 },
+
+    /// Numbers the connected pieces from 0 in the order of their first vertices, and returns how many there
+    /// are; vertices of no face are pieces of their own.
+    fn find_pieces(&mut self, mesh: &Mesh) -> usize {
+        let parent = &mut self.piece;
+        parent.clear();
+        parent.extend(0..mesh.vertices.len() as u32);
+        for &[a, b, c] in &mesh.faces {
+            let joined = join(parent, a, b);
+            join(parent, joined, c);
+        }
+        // A parent never comes after its child, so one pass names them all.
+        let mut count = 0;
+        for vertex in 0..parent.len() {
+            let above = parent[vertex] as usize;
+            parent[vertex] = if above == vertex { count } else { parent[above] };
+            count += u32::from(above == vertex);
+        }
+        count as usize
+    }
+
+    /// Leaves the faces of a piece, with the vertices that they use, in their order.
+    fn extract(&mut self, mesh: &mut Mesh, piece: u32) {
+        let kept = &mut self.kept;
+        kept.vertices.clear();
+        kept.faces.clear();
+        self.moved.clear();
+        self.moved.resize(mesh.vertices.len(), NOWHERE);
+        for face in mesh.faces.iter().filter(|face| self.piece[face[0] as usize] == piece) {
+            kept.faces.push(face.map(|corner| {
+                let moved = &mut self.moved[corner as usize];
+                if *moved == NOWHERE {
+                    *moved = kept.vertices.len() as u32;
+                    kept.vertices.push(mesh.vertices[corner as usize]);
+                }
+                *moved
+            }));
+        }
+        std::mem::swap(mesh, kept);
     }
 }
 
-/// The connected piece of each face, numbered from 0, and how many there are.
-fn pieces(mesh: &Mesh) -> (Vec<usize>, usize) {
-    let mut parent: Vec<usize> = (0..mesh.vertices.len()).collect();
-    for face in &mesh.faces {
-        let [a, b, c] = face.map(|corner| corner as usize);
-        join(&mut parent, a, b);
-        join(&mut parent, b, c);
-    }
-    let mut number = vec![None; mesh.vertices.len()];
-    let mut count = 0;
-    let of_face = mesh.faces.iter().map(|face| {
-        *number[root(&mut parent, face[0] as usize)].get_or_insert_with(|| {
-            count += 1;
-            count - 1
-        })
-    });
-    (of_face.collect(), count)
-}
-
-fn join(parent: &mut [usize], a: usize, b: usize) {
+/// Joins the sets of `a` and `b`, and returns their root.
+fn join(parent: &mut [u32], a: u32, b: u32) -> u32 {
     let (a, b) = (root(parent, a), root(parent, b));
-    parent[a.max(b)] = a.min(b);
+    let (low, high) = (a.min(b), a.max(b));
+    parent[high as usize] = low;
+    low
 }
 
 /// The representative of `x` in a forest of disjoint sets, whose paths are halved on the way.
-fn root(parent: &mut [usize], mut x: usize) -> usize {
-    while parent[x] != x {
-        parent[x] = parent[parent[x]];
-        x = parent[x];
+fn root(parent: &mut [u32], mut x: u32) -> u32 {
+    while parent[x as usize] != x {
+        let above = parent[parent[x as usize] as usize];
+        parent[x as usize] = above;
+        x = above;
     }
     x
-}
-
-/// The faces chosen by `keep`, with the vertices that they use, in their order.
-fn extract(mesh: &Mesh, keep: impl Fn(usize) -> bool) -> Mesh {
-    let mut kept = Mesh::default();
-    let mut moved = vec![None; mesh.vertices.len()];
-    for (_, face) in mesh.faces.iter().enumerate().filter(|&(face, _)| keep(face)) {
-        kept.faces.push(face.map(|corner| {
-            *moved[corner as usize].get_or_insert_with(|| {
-                kept.vertices.push(mesh.vertices[corner as usize]);
-                kept.vertices.len() as u32 - 1
-            })
-        }));
-    }
-    kept
 }
 
 #[cfg(test)]
@@ -110,22 +140,29 @@ mod tests {
     #[test]
     fn keeps_the_largest_and_tells_what_it_dropped() {
         let meshes = [tetrahedron(0.0, 1.0), tetrahedron(50.0, 3.0), tetrahedron(90.0, 2.0)];
-        let got = keep_largest_body(&together(&meshes));
-        assert!((got.mesh.volume() - meshes[1].volume()).abs() < 1e-9);
-        assert_eq!((got.mesh.vertices.len(), got.mesh.faces.len(), got.dropped), (4, 4, 2));
-        assert!((got.dropped_volume - 9.0 / 36.0).abs() < 1e-12);
+        let (mut mesh, mut bodies) = (together(&meshes), Bodies::default());
+        let dropped = bodies.keep_largest(&mut mesh);
+        assert!((mesh.volume() - meshes[1].volume()).abs() < 1e-9);
+        assert_eq!((mesh.vertices.len(), mesh.faces.len(), dropped.bodies), (4, 4, 2));
+        assert!((dropped.volume - 9.0 / 36.0).abs() < 1e-12);
+        // What is left of one mesh does not get into the next.
+        mesh = together(&meshes[..1]);
+        assert_eq!((bodies.keep_largest(&mut mesh), &mesh), (Dropped::default(), &meshes[0]));
     }
 
     #[test]
     fn a_hollow_is_filled_and_is_no_body() {
         let solid = tetrahedron(0.0, 3.0);
-        let got = keep_largest_body(&together(&[tetrahedron(0.0, -0.5), solid.clone()]));
-        assert_eq!((got.mesh.faces.len(), got.dropped, got.dropped_volume), (4, 0, 0.0));
-        assert!((got.mesh.volume() - solid.volume()).abs() < 1e-9);
+        let mut mesh = together(&[tetrahedron(0.0, -0.5), solid.clone()]);
+        let dropped = Bodies::default().keep_largest(&mut mesh);
+        assert_eq!((mesh.faces.len(), dropped), (4, Dropped::default()));
+        assert!((mesh.volume() - solid.volume()).abs() < 1e-9);
     }
 
     #[test]
     fn nothing_stays_nothing() {
-        assert_eq!(keep_largest_body(&Mesh::default()).mesh, Mesh::default());
+        let mut mesh = Mesh::default();
+        Bodies::default().keep_largest(&mut mesh);
+        assert_eq!(mesh, Mesh::default());
     }
 }

@@ -9,13 +9,14 @@ mod curves;
 mod eye;
 mod matching;
 
+use super::times::{Part, stages};
 use super::{Run, words};
 use choices::{Calibration, Choices, Images};
 use curves::Curve;
 use eye::EyeFigures;
 use matching::Matching;
 use serde::Serialize;
-use shared::pipeline::Finding;
+use shared::pipeline::{Finding, Side};
 use std::time::Duration;
 
 /// Version of the fields.
@@ -133,27 +134,13 @@ struct Times {
 
 impl Times {
     fn of(run: &Run<'_>) -> Self {
-        let ms = |time: Duration| (time.as_secs_f64() * 1e6).round() / 1e3;
-        let host = &run.reconstruction.times;
-        let mut times = Self {
-            host: host.iter().map(|(stage, time)| ((*stage).into(), ms(*time).into())).collect(),
-            left: serde_json::Map::new(),
-            right: serde_json::Map::new(),
-            pair: serde_json::Map::new(),
+        let of = |part: Part| {
+            let stages = stages(run).into_iter().filter(|stage| stage.part == part);
+            let ms = |time: Duration| (time.as_secs_f64() * 1e6).round() / 1e3;
+            stages.map(|stage| (stage.name.into(), ms(stage.time).into())).collect()
         };
-        // The record's clock runs since before the images were rectified, if they were.
-        let rectify = host.iter().find(|(stage, _)| *stage == "rectify");
-        let mut before = rectify.map_or(Duration::ZERO, |(_, time)| *time);
-        for lap in &run.record.laps {
-            let list = match lap.side {
-                Some(shared::pipeline::Side::Left) => &mut times.left,
-                Some(shared::pipeline::Side::Right) => &mut times.right,
-                None => &mut times.pair,
-            };
-            list.insert(lap.stage.into(), ms(lap.time.saturating_sub(before)).into());
-            before = Duration::ZERO;
-        }
-        times
+        let [left, right] = [Side::Left, Side::Right].map(|side| of(Part::Eye(side)));
+        Self { host: of(Part::Host), left, right, pair: of(Part::Pair) }
     }
 }
 

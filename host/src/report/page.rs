@@ -11,7 +11,7 @@
 mod space;
 mod views;
 
-use super::{Run, numbers, words};
+use super::{Run, words};
 use serde::Serialize;
 use serde_json::{Value, json};
 use shared::fixed::ONE;
@@ -33,10 +33,10 @@ struct Data {
     report: Value,
 }
 
-/// The page of a run, called `title`.
+/// The page of a run with its report ([`numbers::json`](super::numbers::json)), called `title`.
 #[must_use]
-pub fn html(run: &Run<'_>, title: &str) -> String {
-    let report = serde_json::from_slice(&numbers::json(run)).unwrap_or_default();
+pub fn html(run: &Run<'_>, report: &[u8], title: &str) -> String {
+    let report = serde_json::from_slice(report).unwrap_or_default();
     let eyes = &run.record.eyes;
     let seen = eyes.iter().filter(|eye| !eye.parts.histogram.is_empty());
     let data =
@@ -113,12 +113,13 @@ mod tests {
     use super::*;
     use crate::reconstruct::Mode;
     use crate::report::fixture::Capsule;
+    use crate::report::numbers;
     use crate::report::record::Record;
 
     #[test]
     fn a_page_names_no_address_and_keeps_its_policy() {
         let capsule = Capsule::new(Mode::Default, Record::new());
-        let page = html(&capsule.run(), "a <b> \"cup\"");
+        let page = html(&capsule.run(), &numbers::json(&capsule.run()), "a <b> \"cup\"");
         assert!(page.contains("<title>a &lt;b&gt; &quot;cup&quot;</title>"));
         assert!(page.contains("default-src 'none'"));
         let own = page.replace(plotly(), "");
@@ -135,7 +136,7 @@ mod tests {
     #[test]
     fn what_was_not_seen_has_no_layer() {
         let capsule = Capsule::new(Mode::Paper { omega: 3 }, Record::figures_only());
-        let page = html(&capsule.run(), "paper");
+        let page = html(&capsule.run(), &numbers::json(&capsule.run()), "paper");
         assert!(!page.contains("class=\"layer grey\""));
         assert!(page.contains("class=\"layer contour\""));
     }

@@ -19,7 +19,7 @@ use shared::stage::medial::MedialBall;
 use shared::stage::nearest::Pair;
 use shared::stage::nurbs::Control;
 use shared::stage::rows::{ContourMatch, RowStatistics};
-use shared::stage::{prune, thinning};
+use shared::stage::{parallel_thinning, prune};
 use std::time::{Duration, Instant};
 
 /// Distances to the background, 1/16 px.
@@ -75,7 +75,7 @@ pub struct Parts {
     /// Largest distance to the background, 1/16 px.
     pub widest: u16,
     /// What thinning did.
-    pub thinning: thinning::Report,
+    pub thinning: parallel_thinning::Report,
     /// What pruning did.
     pub pruning: prune::Report,
     /// Nodes of the pruned graph.

@@ -8,9 +8,11 @@
 //!   the contacts are no diameter.
 //! * **Radius**: the paper's rule, the distance to the nearest boundary point, but taken to the viewing
 //!   rays of the left boundary, which the depth noise of boundary points does not touch.
-//! * **Cost**: number of balls times contour length.
+//! * **Cost**: a ball's search for its nearest ray is about logarithmic in the contour's length (`runs.rs`); lists
+//!   are filled anew, and allocate nothing once they are long enough.
 
 use super::rectify::RectifiedCamera;
+use crate::runs::Runs;
 use nalgebra::{Point3, Vector2, Vector3};
 use shared::fixed::PX;
 use shared::point::{Direction, PixelPoint};
@@ -76,8 +78,8 @@ fn unit(d: Direction) -> Vector2<f64> {
     Vector2::new(f64::from(d.u), f64::from(d.v)) / 16384.0
 }
 
-/// The contour in pixels.
-pub fn edges(points: &[ContourPoint], matches: &[ContourMatch]) -> Vec<Edge> {
+/// Fill `edges` with the contour in pixels.
+pub fn edges(points: &[ContourPoint], matches: &[ContourMatch], edges: &mut Vec<Edge>) {
     let edge = |(p, m): (&ContourPoint, &ContourMatch)| Edge {
         at: px2(p.at),
         normal: unit(p.normal),
@@ -86,16 +88,17 @@ pub fn edges(points: &[ContourPoint], matches: &[ContourMatch]) -> Vec<Edge> {
         weight: f64::from(m.weight) / 16384.0,
         border: p.border,
     };
-    points.iter().zip(matches).map(edge).collect()
+    edges.clear();
+    edges.extend(points.iter().zip(matches).map(edge));
 }
 
-/// The medial balls in pixels, with the rays to their centres.
+/// Fill `balls` with the medial balls in pixels, with the rays to their centres.
 pub fn balls(
     camera: &RectifiedCamera,
     edges: &[Edge],
-    medial: &[MedialBall],
-    depths: &[BallDepth],
-) -> Vec<Ball> {
+    (medial, depths): (&[MedialBall], &[BallDepth]),
+    balls: &mut Vec<Ball>,
+) {
     let ball = |(m, d): (&MedialBall, &BallDepth)| {
         let contacts = m.contacts.map(|k| k as usize);
         let (at, rho) = (px2(m.centre), px(m.rho));
@@ -110,7 +113,8 @@ pub fn balls(
             ray: centre_ray(camera, at, rho, chord),
         }
     };
-    medial.iter().zip(depths).map(ball).collect()
+    balls.clear();
+    balls.extend(medial.iter().zip(depths).map(ball));
 }
 
 /// The ray to the centre of a ball whose image has its middle at `at`.
@@ -133,19 +137,42 @@ pub(super) fn centre_ray(
     Vector3::new(centre.x, centre.y, 1.0)
 }
 
-/// Distance from a point to the nearest viewing ray of the left boundary, mm: the radius of the ball
-/// there. Infinite without an edge.
-pub fn distance_to_rays(rays: &[Vector3<f64>], centre: &Point3<f64>) -> f64 {
-    let squared = |ray: &Vector3<f64>| centre.coords.cross(ray).norm_squared();
-    rays.iter().map(squared).fold(f64::INFINITY, f64::min).sqrt()
+/// The viewing rays of the left boundary, the image's border left out.
+#[derive(Debug, Default)]
+pub struct Rays {
+    /// Of length 1.
+    rays: Vec<Vector3<f64>>,
+    /// Where they meet the plane at distance 1.
+    met: Runs<2>,
+    /// Square of the least z of a ray.
+    steepest: f64,
 }
 
-/// Distance from a point to the nearest of others, mm; infinite if there is none.
-pub fn distance_to_points(points: &[Point3<f64>], centre: &Point3<f64>) -> f64 {
-    points.iter().map(|p| (p - centre).norm_squared()).fold(f64::INFINITY, f64::min).sqrt()
+impl Rays {
+    /// Take those of another boundary.
+    pub fn build(&mut self, camera: &RectifiedCamera, edges: &[Edge]) {
+        self.rays.clear();
+        let seen = edges.iter().filter(|e| !e.border);
+        self.rays.extend(seen.map(|e| camera.ray(e.at.x, e.at.y).normalize()));
+        self.met.build(self.rays.iter().map(|ray| [ray.x / ray.z, ray.y / ray.z]));
+        self.steepest = self.rays.iter().map(|ray| ray.z).fold(1.0, f64::min).powi(2);
+    }
+
+    /// Distance from a point in front of the camera to the nearest ray, mm: the radius of the ball there. Infinite
+    /// without a ray.
+    ///
+    /// Where p and q are the places at which the ways to the point and along a ray r meet the plane at distance 1,
+    /// |p x q| is at least |p - q|, so the distance is at least |p - q| z r_z.
+    pub fn distance(&self, centre: &Point3<f64>) -> f64 {
+        let at = [centre.x / centre.z, centre.y / centre.z];
+        let square = |k: usize| centre.coords.cross(&self.rays[k]).norm_squared();
+        let nearest = self.met.nearest(&at, centre.z * centre.z * self.steepest, square);
+        nearest.map_or(f64::INFINITY, |(_, square)| square.sqrt())
+    }
 }
 
-/// Unit viewing rays of the left boundary, the image's border left out.
-pub fn boundary_rays(camera: &RectifiedCamera, edges: &[Edge]) -> Vec<Vector3<f64>> {
-    edges.iter().filter(|e| !e.border).map(|e| camera.ray(e.at.x, e.at.y).normalize()).collect()
+/// Distance from a point to the nearest of others, mm; infinite if there is none. `runs` are those of the points.
+pub fn distance_to_points(points: &[Point3<f64>], runs: &Runs<3>, centre: &Point3<f64>) -> f64 {
+    let square = |k: usize| (points[k] - centre).norm_squared();
+    runs.nearest(&centre.coords.into(), 1.0, square).map_or(f64::INFINITY, |(_, square)| square.sqrt())
 }

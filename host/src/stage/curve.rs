@@ -5,15 +5,15 @@
 //! * **How**: a ball touches the contour at the point nearest to its centre, and at the nearest of those
 //!   seen more than 73 degrees from there. Its depth is as well known as the contacts', but at least
 //!   a quarter: the fit has averaged along the curve already.
-//! * **Cost**: number of balls times contour length.
+//! * **Cost**: a search of the contour's runs (`runs.rs`) a ball.
 
 use super::balls::{Ball, Edge, centre_ray, px, px2};
 use super::rectify::RectifiedCamera;
 use super::solid::Chain;
+use crate::runs::Runs;
 use nalgebra::Vector2;
 use shared::fixed::PX;
 use shared::pipeline::Branch;
-use shared::stage::branch;
 use shared::stage::nurbs::Control;
 use std::convert::Infallible;
 
@@ -24,26 +24,21 @@ const APART: f64 = 0.3;
 /// Least trust in a ball's depth.
 const LEAST_WEIGHT: f64 = 0.25;
 
-/// The balls of all curves and the chain of each.
+/// Fill `balls` with those of all curves and `chains` with the chain of each; `runs` are those of the edges.
 pub fn curve_balls(
     camera: &RectifiedCamera,
-    edges: &[Edge],
-    branches: &[Branch],
-    controls: &[Control],
-) -> (Vec<Ball>, Vec<Chain>) {
-    let (mut balls, mut chains) = (Vec::new(), Vec::new());
+    (edges, runs): (&[Edge], &Runs<2>),
+    (branches, controls): (&[Branch], &[Control]),
+    (balls, chains): (&mut Vec<Ball>, &mut Vec<Chain>),
+) {
+    balls.clear();
+    chains.clear();
     for branch in branches {
         let Some(curve) = branch.curve(controls) else { continue };
-        let mut points: Vec<branch::Ball> = Vec::new();
-        let Ok(()) = curve.sample::<Infallible>(STEP * PX, |ball| {
-            points.push(ball);
-            Ok(())
-        });
         let start = balls.len();
-        chains.push(Chain { start, len: points.len(), closed: branch.closed });
-        for (k, point) in points.iter().enumerate() {
+        let Ok(()) = curve.sample::<Infallible>(STEP * PX, |point| {
             let (at, rho) = (px2(point.at()), px(point.rho));
-            let contacts = contacts(edges, at);
+            let contacts = contacts(edges, runs, at);
             let weight = contacts.iter().map(|&k| edges[k].weight).sum::<f64>() / 2.0;
             balls.push(Ball {
                 at,
@@ -51,20 +46,23 @@ pub fn curve_balls(
                 disparity: px(point.d),
                 weight: weight.max(LEAST_WEIGHT),
                 contacts,
-                place: start + k,
+                place: balls.len(),
                 ray: centre_ray(camera, at, rho, edges[contacts[0]].at - edges[contacts[1]].at),
             });
-        }
+            Ok(())
+        });
+        chains.push(Chain { start, len: balls.len() - start, closed: branch.closed });
     }
-    (balls, chains)
 }
 
 /// The contour points that a ball about `at` touches; the nearest twice if there is no other side.
-fn contacts(edges: &[Edge], at: Vector2<f64>) -> [usize; 2] {
+fn contacts(edges: &[Edge], runs: &Runs<2>, at: Vector2<f64>) -> [usize; 2] {
     let nearest = |counts: &dyn Fn(Vector2<f64>) -> bool| {
-        let candidates = (0..edges.len()).filter(|&k| counts(edges[k].at - at));
-        candidates
-            .min_by(|&a, &b| (edges[a].at - at).norm_squared().total_cmp(&(edges[b].at - at).norm_squared()))
+        let square = |k: usize| {
+            let way = edges[k].at - at;
+            if counts(way) { way.norm_squared() } else { f64::INFINITY }
+        };
+        runs.nearest(&at.into(), 1.0, square).map(|(k, _)| k)
     };
     let first = nearest(&|_| true).unwrap_or(0);
     let towards = (edges[first].at - at).try_normalize(0.0).unwrap_or_default();

@@ -248,13 +248,20 @@ impl Rectification {
         Self::new(pair, canvas::same_size)
     }
 
+    /// The rectification of a pair that needs none, if it is one.
+    #[must_use]
+    pub fn untouched(pair: &StereoCamera) -> Option<Self> {
+        let camera = pair.check().ok().and_then(|()| already_rectified(pair))?;
+        Some(Self { camera, source: *pair, eyes: None })
+    }
+
     fn new(
         pair: &StereoCamera,
         lay: impl FnOnce(&[Turned; 2]) -> Result<Canvas, RectifyError>,
     ) -> Result<Self, RectifyError> {
         pair.check()?;
-        if let Some(camera) = already_rectified(pair) {
-            return Ok(Self { camera, source: *pair, eyes: None });
+        if let Some(untouched) = Self::untouched(pair) {
+            return Ok(untouched);
         }
         let [left_turn, right_turn] = bouguet(pair);
         let eyes = [
@@ -305,12 +312,28 @@ impl Rectification {
     ///
     /// [`CalibrationError::Size`] when the images are not those that the calibration is for.
     pub fn images(&self, left: GrayImage, right: GrayImage) -> Result<[GrayImage; 2], RectifyError> {
-        self.check_sizes([&left, &right])?;
-        let Some([left_eye, right_eye]) = &self.eyes else { return Ok([left, right]) };
-        let resampled = |eye: &Turned, image: &GrayImage| {
-            resample::resample(eye, &self.camera, self.column_of_axis(eye.eye), image)
-        };
-        Ok([resampled(left_eye, &left), resampled(right_eye, &right)])
+        let mut made = Default::default();
+        self.images_into([&left, &right], &mut made)?;
+        Ok(if self.is_identity() { [left, right] } else { made })
+    }
+
+    /// The images of the virtual pair, left and right: the raw ones if they pass untouched, or else those that
+    /// are made in the memory of `made`.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::images`].
+    pub fn images_into<'a>(
+        &self,
+        raw: [&'a GrayImage; 2],
+        made: &'a mut [GrayImage; 2],
+    ) -> Result<[&'a GrayImage; 2], RectifyError> {
+        self.check_sizes(raw)?;
+        let Some(eyes) = &self.eyes else { return Ok(raw) };
+        for ((eye, raw), made) in eyes.iter().zip(raw).zip(made.iter_mut()) {
+            resample::resample(eye, &self.camera, self.column_of_axis(eye.eye), raw, made);
+        }
+        Ok(made.each_ref())
     }
 
     fn check_sizes(&self, [left, right]: [&GrayImage; 2]) -> Result<(), CalibrationError> {

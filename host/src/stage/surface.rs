@@ -6,29 +6,33 @@
 //! area, and no two faces cross.
 //!
 //! The union is an implicit function, the least of the exact signed distances to the cones
-//! (`distance.rs`, `nearby.rs`). It is looked at only where the surface can pass (`block.rs`), on a
-//! body-centred cubic lattice whose tetrahedra are cut where the function changes its sign
-//! (`tetrahedra.rs`), and the pieces are joined (`stitch.rs`). Tetrahedra, because a plane cuts one in a
-//! triangle or a quadrilateral and nothing else: there is no ambiguous case, so the promise holds by
-//! construction instead of by repair (`docs/decisions/0003-isosurface.md`).
+//! (`distance.rs`). It is looked at only where the surface can pass (`region.rs`, `block.rs`), there with
+//! the cones that can be the nearest (`prune.rs`, `bundle.rs`), on a body-centred cubic lattice
+//! (`lattice.rs`) whose tetrahedra are cut where the function changes its sign (`patch.rs`). Each point, edge
+//! and tetrahedron belongs to one block and is worked out once (`mesher.rs`). Tetrahedra, because a plane
+//! cuts one in a triangle or a quadrilateral and nothing else: there is no ambiguous case, so the promise
+//! holds by construction instead of by repair (`docs/decisions/0003-isosurface.md`,
+//! `docs/decisions/0014-fast-isosurface.md`).
 //!
 //! Cost: proportional to surface / cell². The result has the same bits for any number of threads.
 //! Not promised: features thinner than the cell may be missing, and concave creases are rounded by up to
 //! a cell.
 
 mod block;
+mod bundle;
 mod distance;
-mod nearby;
-mod stitch;
-mod tetrahedra;
+mod lanes;
+mod lattice;
+mod mesher;
+mod patch;
+mod prune;
+mod region;
 
 use nalgebra::Point3;
-use rayon::prelude::*;
 use thiserror::Error;
 
 use crate::mesh::Mesh;
-use block::Lattice;
-use distance::Distance;
+pub use mesher::Mesher;
 
 /// The convex hull of two balls: the piece of the solid between neighbouring samples of the curve
 /// skeleton. With equal ends it is one ball.
@@ -88,14 +92,9 @@ const CUBE: f64 = 1.5;
 ///
 /// See [`SurfaceError`].
 pub fn surface(cones: &[RoundCone], cell: f64) -> Result<Mesh, SurfaceError> {
-    check(cones, cell)?;
-    let distances: Vec<Distance> = cones.iter().map(Distance::to).collect();
-    let lattice = Lattice::around(cones, cell * CUBE);
-    let blocks =
-        lattice.blocks_near_surface(&distances).ok_or(SurfaceError::TooFine { cell, size: lattice.size })?;
-    let patches = blocks.par_iter().map(|block| tetrahedra::cut(&lattice, block, &distances)).collect();
-    let mesh = stitch::join(patches);
-    if mesh.faces.is_empty() { Err(SurfaceError::TooCoarse { cell }) } else { Ok(mesh) }
+    let mut mesh = Mesh::default();
+    Mesher::default().surface(cones, cell, &mut mesh)?;
+    Ok(mesh)
 }
 
 fn check(cones: &[RoundCone], cell: f64) -> Result<(), SurfaceError> {

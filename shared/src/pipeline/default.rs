@@ -67,10 +67,11 @@ pub(super) fn match_views(
     let [left, _] = &mut memory.eyes;
     left.samples.clear();
     left.branches.clear();
-    let balls = Balls { balls: memory.balls, depths: memory.depths };
+    let mut scratch = Arena::new(memory.scratch);
+    let balls = Balls::new(memory.balls, memory.depths, &mut scratch)?;
     each_branch(&left.graph, |path, free, nodes, closed| {
         let start = left.samples.len();
-        trace_branch(path, free, balls, left.samples)?;
+        trace_branch(path, free, &balls, left.samples)?;
         add_branch(left.branches, left.samples, start, nodes, closed)
     })?;
     fit_curves(left, Arena::new(memory.scratch), &settings.curves)?;
@@ -85,7 +86,7 @@ pub(super) fn lift_balls(
     observer: &mut impl Observer,
 ) -> Result<(), CapacityError> {
     let contour = &*memory.eyes[0].contour;
-    medial_balls(contour, memory.balls)?;
+    medial_balls(contour, Arena::new(memory.scratch), memory.balls)?;
     ball_depths(memory.balls, contour, memory.matches, optics, memory.depths)?;
     observer.saw(None, Product::Balls(memory.balls, memory.depths));
     Ok(())

@@ -16,6 +16,7 @@ use crate::stage::distance::{self, scratch_parabolas};
 use crate::stage::graph::{Graph, NodeKind};
 use crate::stage::nurbs::{self, FitParams};
 use crate::stage::prune;
+use crate::stage::sequential_thinning;
 use crate::stage::thinning;
 use heapless::VecView;
 
@@ -44,9 +45,8 @@ pub(super) fn outline(
     let size = grey.size();
     let mut saw = |product: Product<'_>| observer.saw(Some(side), product);
     let filtered = filtered(size, settings, &mut scratch)?;
-    let (grey, mask) =
+    let (grey, mask, area) =
         silhouette(side, grey, (eye.mask, filtered, scratch.fork()), (settings, kernels), gates, &mut saw)?;
-    let area = mask.count() as u32;
 
     saw(Product::Boundary(&boundary(&mask, Element::Square, scratch.fork().take(size.words(), WORDS)?)?));
     let edges = settings.sub_pixel.then_some(grey);
@@ -68,7 +68,7 @@ pub(super) fn skeleton(
     (side, size): (Side, Size),
     eye: &mut EyeMemory<'_>,
     mut scratch: Arena<'_>,
-    settings: &Settings,
+    (settings, kernels): (&Settings, &Kernels),
     gates: &mut Gates,
     observer: &mut impl Observer,
 ) -> Result<(), Finding> {
@@ -85,8 +85,9 @@ pub(super) fn skeleton(
         };
         saw(Product::Distance(&plane));
         skeleton.copy_from(&mask);
-        let thinned = thinning::thin(&mut skeleton, settings.thinning, &plane, scratch.fork())?;
-        thinning::minimal(&mut skeleton);
+        let thinned =
+            thinning::thin(&mut skeleton, (settings.thinning, kernels.thin), &plane, scratch.fork())?;
+        sequential_thinning::minimal(&mut skeleton);
         saw(Product::Skeleton(&skeleton, thinned));
         if skeleton.count() == 0 {
             gates.meet(Finding::SkeletonErased(side))?;
@@ -120,7 +121,7 @@ fn filtered<'a>(
     scratch.take(if settings.median { size.pixels() } else { 0 }, "pixels in a picture")
 }
 
-/// The filtered picture and the cleaned mask of its largest object.
+/// The filtered picture, the cleaned mask of its largest object, and that one's area.
 fn silhouette<'a>(
     side: Side,
     grey: Grey<'a>,
@@ -128,7 +129,7 @@ fn silhouette<'a>(
     (settings, kernels): (&Settings, &Kernels),
     gates: &mut Gates,
     saw: &mut impl FnMut(Product<'_>),
-) -> Result<(Grey<'a>, Bitmap<'a>), Finding> {
+) -> Result<(Grey<'a>, Bitmap<'a>, u32), Finding> {
     let size = grey.size();
     let pixels = size.pixels() as u32;
     let grey = if settings.median { binarise::median(grey, filtered, kernels.median_row)? } else { grey };
@@ -141,10 +142,9 @@ fn silhouette<'a>(
     }
 
     let mut mask = binarise::binarise(grey, level, tone, mask)?;
-    let words = scratch.take(clean::scratch_words(size), WORDS)?;
-    let components = clean::keep_largest(&mut mask, words)?;
-    clean::fill_holes(&mut mask, clean::HOLE_AREA, words)?;
-    let area = mask.count() as u32;
+    let components = clean::keep_largest(&mut mask, scratch.fork())?;
+    let holes = clean::fill_holes(&mut mask, clean::HOLE_AREA, scratch)?;
+    let area = components.largest + holes.area;
     saw(Product::Mask(&mask, components));
     if area < MIN_AREA {
         gates.meet(Finding::NoObject(side, area))?;
@@ -156,7 +156,7 @@ fn silhouette<'a>(
     if percent(components.second, components.largest) > SECOND_COVER {
         gates.meet(Finding::SecondObject(side, percent(components.second, components.largest)))?;
     }
-    Ok((grey, mask))
+    Ok((grey, mask, area))
 }
 
 /// The box of the object in a picture, found and judged as a run would: what a rectification is laid
@@ -172,7 +172,7 @@ pub fn object_box(
 ) -> Result<PixelBox, Finding> {
     let (mut gates, mut scratch) = (Gates::new(settings), Arena::new(scratch));
     let filtered = filtered(grey.size(), settings, &mut scratch)?;
-    let (_, mask) =
+    let (_, mask, _) =
         silhouette(side, grey, (mask, filtered, scratch), (settings, kernels), &mut gates, &mut |_| ())?;
     mask.bounds().ok_or(Finding::NoObject(side, 0))
 }

@@ -5,6 +5,7 @@ use crate::arena;
 use crate::bitmap::{Size, Word};
 use crate::point::PixelPoint;
 use crate::stage::branch::Sample;
+use crate::stage::clean;
 use crate::stage::contour::{ContourLoop, ContourPoint, EdgeCrossing};
 use crate::stage::depth::BallDepth;
 use crate::stage::distance::{Parabola, scratch_parabolas};
@@ -12,6 +13,7 @@ use crate::stage::graph::Graph;
 use crate::stage::medial::MedialBall;
 use crate::stage::nearest::Pair;
 use crate::stage::nurbs::{Control, Nurbs};
+use crate::stage::parallel_thinning;
 use crate::stage::prune::Tip;
 use crate::stage::rows::{ContourMatch, RowCrossing, Trusted};
 use heapless::VecView;
@@ -81,14 +83,16 @@ pub struct Memory<'a> {
 }
 
 /// Words of scratch that pictures of a size need, if a contour has up to `points` points and a curve up to
-/// `controls` control points. `order` is [`scratch_order`](crate::stage::thinning::scratch_order) where
+/// `controls` control points. `order` is [`scratch_order`](crate::stage::sequential_thinning::scratch_order) where
 /// thinning keeps to the distance, or 0.
 pub const fn scratch_words(size: Size, points: usize, controls: usize, order: usize) -> usize {
     let bitmap = arena::words::<Word>(size.words());
     let distance = arena::words::<u16>(size.pixels()) + bitmap;
-    let thinning = arena::words::<Parabola>(scratch_parabolas(size.width)) + arena::words::<u32>(order);
+    let parabolas = arena::words::<Parabola>(scratch_parabolas(size.width));
+    let ordered = max(parabolas, arena::words::<u32>(order));
     let pruning = bitmap + arena::words::<Tip>(points / 8);
-    let skeleton = distance + max(max(thinning, 2 * arena::words::<Word>(size.row_words())), pruning);
+    let skeleton =
+        distance + max(max(ordered, arena::words::<Word>(parallel_thinning::scratch_words(size))), pruning);
     let rows = 2 * (arena::words::<u32>(size.height + 1) + arena::words::<RowCrossing>(points));
     let pair = rows + arena::words::<Trusted>(points);
     max(max(outline_words(size, points), skeleton), max(pair, (7 + 4) * controls))
@@ -99,7 +103,7 @@ pub const fn outline_words(size: Size, points: usize) -> usize {
     let bitmap = arena::words::<Word>(size.words());
     // A loop has up to sqrt 2 cracks a point, the staircase of a diagonal.
     let cracks = arena::words::<EdgeCrossing>(points * 3 / 2);
-    arena::words::<u8>(size.pixels()) + max(2 * bitmap, bitmap + cracks)
+    arena::words::<u8>(size.pixels()) + max(clean::scratch_words(size), bitmap + cracks)
 }
 
 const fn max(a: usize, b: usize) -> usize {

@@ -222,7 +222,8 @@ impl Run {
         observer: &mut impl Observer,
     ) -> Result<(), Finding> {
         let figures = self.figures[side as usize].ok_or(Finding::NoObject(side, 0))?;
-        eye::skeleton((side, figures.size), eye, scratch, &self.settings, &mut self.gates, observer)
+        let Self { settings, kernels, gates, .. } = self;
+        eye::skeleton((side, figures.size), eye, scratch, (settings, kernels), gates, observer)
     }
 
     /// From both eyes to the described pair.

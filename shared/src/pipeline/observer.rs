@@ -12,9 +12,9 @@ use crate::stage::graph::Graph;
 use crate::stage::medial::MedialBall;
 use crate::stage::nearest::Pair;
 use crate::stage::nurbs::Control;
+use crate::stage::parallel_thinning;
 use crate::stage::prune;
 use crate::stage::rows::{ContourMatch, RowStatistics};
-use crate::stage::thinning;
 
 /// What passes by on the way, for pictures, timings and records.
 pub enum Product<'a> {
@@ -29,7 +29,7 @@ pub enum Product<'a> {
     /// Distance to the background, 1/16 px.
     Distance(&'a Plane<'a, u16>),
     /// The thinned mask, one pixel wide.
-    Skeleton(&'a Bitmap<'a>, thinning::Report),
+    Skeleton(&'a Bitmap<'a>, parallel_thinning::Report),
     /// The skeleton that pruning left, and its graph.
     Graph(&'a Bitmap<'a>, &'a Graph<'a>, prune::Report),
     /// Vertices of the convex hull, in the coordinates that are matched: right rows moved by the

@@ -40,13 +40,14 @@ pub(super) fn match_as_paper(
     };
     let boundaries = [edge(left.mask)?, edge(right.mask)?];
     let points = |i: usize| boundaries[i].pixels().map(Pixel::centre);
-    pair_nearest(points(0), || points(1), &matched.map, memory.boundary_pairs)?;
+    pair_nearest(points(0), || points(1), &matched.map, scratch.fork(), memory.boundary_pairs)?;
     let skeleton = |samples: &'_ VecView<Sample>, k: usize| samples[k].ball.at();
     let (l, r) = (&*left.samples, &*right.samples);
     pair_nearest(
         (0..l.len()).map(|k| skeleton(l, k)),
         || (0..r.len()).map(|k| skeleton(r, k)),
         &matched.map,
+        scratch,
         memory.skeleton_pairs,
     )?;
     observer.saw(None, Product::Pairs(memory.boundary_pairs, memory.skeleton_pairs));

@@ -5,8 +5,10 @@
 //! * **How**: a sample is the average of the balls whose centres lie within 2 px of the path's pixel,
 //!   weighted by (1 - (distance / 2 px)^2)^2. Thinning stops short of the last medial ball, most of all in
 //!   corners, so a free end is continued along its own direction from ball to ball.
-//! * **Cost**: path length times number of balls.
+//! * **Cost**: about 200 instructions a pixel of the path, and as many a ball of a tip; the logarithm of the
+//!   number of balls is in it.
 
+use crate::arena::Arena;
 use crate::bitmap::Plane;
 use crate::fixed::{ONE, PX, UNIT, div_round};
 use crate::limits::{CapacityError, push};
@@ -14,6 +16,7 @@ use crate::point::{Direction, Pixel, PixelPoint};
 use crate::stage::depth::BallDepth;
 use crate::stage::distance::DISTANCE_PX;
 use crate::stage::medial::MedialBall;
+use crate::strips::{Disc, Strips};
 use bytemuck::{Pod, Zeroable};
 use heapless::VecView;
 
@@ -55,12 +58,23 @@ impl Sample {
 }
 
 /// The medial balls of a view with their depths, in the same order.
-#[derive(Clone, Copy)]
 pub struct Balls<'a> {
-    /// Centres, radii and contacts.
-    pub balls: &'a [MedialBall],
-    /// Disparities.
-    pub depths: &'a [BallDepth],
+    depths: &'a [BallDepth],
+    strips: Strips<'a, MedialBall>,
+}
+
+impl<'a> Balls<'a> {
+    /// Balls that can be found by their places.
+    ///
+    /// # Errors
+    /// A [`CapacityError`] when the scratch is too short.
+    pub fn new<'s: 'a>(
+        balls: &'a [MedialBall],
+        depths: &'a [BallDepth],
+        scratch: &mut Arena<'s>,
+    ) -> Result<Self, CapacityError> {
+        Ok(Self { depths, strips: Strips::new(balls, scratch)? })
+    }
 }
 
 /// Balls farther than this from a path's pixel do not count, 1/256 px.
@@ -82,7 +96,7 @@ const TIP_SPAN: usize = 8;
 pub fn trace_branch(
     path: &[Pixel],
     free: [bool; 2],
-    balls: Balls<'_>,
+    balls: &Balls<'_>,
     samples: &mut VecView<Sample>,
 ) -> Result<(), CapacityError> {
     let start = samples.len();
@@ -122,28 +136,26 @@ pub fn trace_pixels(
 }
 
 /// The weighted average of the balls around a point.
-fn average(at: PixelPoint, balls: Balls<'_>) -> Option<Sample> {
+fn average(at: PixelPoint, balls: &Balls<'_>) -> Option<Sample> {
     let reach_squared = i64::from(REACH).pow(2);
     let mut sums = [0i64; 5];
     let mut total = 0;
-    for (ball, depth) in balls.balls.iter().zip(balls.depths) {
+    balls.strips.walk(Disc { centre: at, squared: reach_squared }, |k, ball, _| {
         let near = reach_squared - at.distance_squared(ball.centre);
-        if near > 0 {
-            // At most 2^18 each; 24 bits of their product are kept, so that 2^16 balls fit.
-            let weight = (near * near) >> 12;
-            let Sample { ball: Ball { u, v, rho, d }, weight: trust } = Sample::of(ball, depth);
-            for (sum, value) in sums.iter_mut().zip([u, v, rho, d, trust]) {
-                *sum += weight * i64::from(value);
-            }
-            total += weight;
+        // At most 2^18 each; 24 bits of their product are kept, so that 2^16 balls fit.
+        let weight = (near * near) >> 12;
+        let Sample { ball: Ball { u, v, rho, d }, weight: trust } = Sample::of(ball, &balls.depths[k]);
+        for (sum, value) in sums.iter_mut().zip([u, v, rho, d, trust]) {
+            *sum += weight * i64::from(value);
         }
-    }
+        total += weight;
+    });
     let [u, v, rho, d, weight] = sums.map(|s| div_round(s, total) as i32);
     (total > 0).then_some(Sample { ball: Ball { u, v, rho, d }, weight })
 }
 
 /// Continue the samples from `start` beyond the last one, from ball to ball ahead that does not grow.
-fn continue_tip(start: usize, balls: Balls<'_>, samples: &mut VecView<Sample>) -> Result<(), CapacityError> {
+fn continue_tip(start: usize, balls: &Balls<'_>, samples: &mut VecView<Sample>) -> Result<(), CapacityError> {
     if samples.len() - start < TIP_MIN {
         return Ok(());
     }
@@ -154,16 +166,25 @@ fn continue_tip(start: usize, balls: Balls<'_>, samples: &mut VecView<Sample>) -
         let behind = samples[start.max(samples.len() - 1 - TIP_SPAN.min(samples.len() - 1))].ball;
         let Some(direction) = Direction::of(tip.u - behind.u, tip.v - behind.v) else { return Ok(()) };
         let across = Direction { u: -direction.v, v: direction.u };
-        let ahead = balls.balls.iter().zip(balls.depths).filter_map(|(ball, depth)| {
+        // Of equals the first.
+        let (mut step, mut next) = (TIP_REACH.min(left), None);
+        balls.strips.walk(ahead(tip.at(), step), |k, ball, disc| {
             let along = direction.along(tip.at(), ball.centre);
             let aside = across.along(tip.at(), ball.centre).abs();
-            let lies_ahead = along > TIP_STEP && along < TIP_REACH.min(left) && aside < PX + along / 10;
-            (lies_ahead && ball.rho <= tip.rho + PX / 4).then_some((along, ball, depth))
+            let lies_ahead = along > TIP_STEP && along < step && aside < PX + along / 10;
+            if lies_ahead && ball.rho <= tip.rho + PX / 4 {
+                (step, next, *disc) = (along, Some((ball, &balls.depths[k])), ahead(tip.at(), along));
+            }
         });
-        let Some((along, ball, depth)) = ahead.min_by_key(|(along, ..)| *along) else { return Ok(()) };
+        let Some((ball, depth)) = next else { return Ok(()) };
         push(samples, Sample::of(ball, depth), "branch samples")?;
-        left -= along;
+        left -= step;
     }
+}
+
+/// Whatever lies less than `step` ahead of a tip, and by little more than a tenth of that aside, is in here.
+fn ahead(tip: PixelPoint, step: i32) -> Disc {
+    Disc { centre: tip, squared: i64::from((step + step / 8 + 2 * PX).max(0)).pow(2) }
 }
 
 #[cfg(test)]
@@ -183,8 +204,9 @@ mod tests {
             (0..54).map(|k| BallDepth { disparity: 90 * PX + k, weight: 16384 }).collect();
         let path: Vec<_, 64> = (2..20).map(|u| Pixel { u, v: 10 }).collect();
         let mut samples = Vec::<_, 64>::new();
-        let all = Balls { balls: &balls, depths: &depths };
-        trace_branch(&path, [false, true], all, &mut samples).unwrap();
+        let mut block = [0; 64];
+        let all = Balls::new(&balls, &depths, &mut Arena::new(&mut block)).unwrap();
+        trace_branch(&path, [false, true], &all, &mut samples).unwrap();
         assert!(samples.iter().all(|s| s.ball.v == 10 * PX + 40));
         assert!(samples.windows(2).all(|w| w[0].ball.u < w[1].ball.u && w[0].ball.rho > w[1].ball.rho));
         let last = samples.last().unwrap().ball.u;

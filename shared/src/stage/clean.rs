@@ -6,26 +6,32 @@
 //! |---|---|
 //! | in, out | a [`Bitmap`], changed in place |
 //! | components | of the object 8-connected, of the background 4-connected |
-//! | scratch | [`scratch_words`]: two bitmaps of the same size, contents irrelevant; no labels |
+//! | scratch | [`scratch_words`]: a bitmap of the same size and two rows of runs, contents irrelevant; no labels |
 //! | bounds | areas below 2^24 + 1 px |
-//! | cost | see below; closing and opening four passes over the words each |
+//! | cost | a pass over the words and their runs, and the area of what is taken away or filled; closing and opening four passes over the words each |
 //!
-//! A component is flooded word by word: fresh pixels wait in the bitmap `front`, a visit takes a word of
-//! them, completes its runs by a carry and reaches into the eight words around it. Rows are visited in
-//! sweeps, down then up, over the box of words in which fresh pixels wait. A word is visited only after it
-//! gained a pixel, so there are at most as many visits as pixels; a sweep further costs a look at each
-//! word of its box. A speck therefore costs a handful of words, and only shapes that turn back between
-//! up and down many times (spirals, combs) need more than a few sweeps.
+//! Components are found by their runs ([`components`]); only one that goes is looked at again. It is flooded
+//! word by word: fresh pixels wait in the bitmap `front`, a visit takes a word of them, completes its runs by
+//! a carry and reaches into the eight words around it. Rows are visited in sweeps, down then up, over the box
+//! of words in which fresh pixels wait. A word is visited only after it gained a pixel, so there are at most
+//! as many visits as pixels; a sweep further costs a look at each word of its box. A speck therefore costs a
+//! handful of words, and only shapes that turn back between up and down many times (spirals, combs) need more
+//! than a few sweeps.
 
+mod components;
+
+use crate::arena::{Arena, words};
 use crate::bitmap::{Bitmap, Size, WORD_BITS, Word, at};
 use crate::limits::CapacityError;
+use crate::point::Pixel;
+use components::{Component, Run, each_component, runs};
 
 /// Holes of fewer pixels than this are filled by default, px^2.
 pub const HOLE_AREA: u32 = 60;
 
 /// Words of scratch that [`keep_largest`] and [`fill_holes`] need.
 pub const fn scratch_words(size: Size) -> usize {
-    2 * size.words()
+    words::<Word>(size.words()) + 2 * words::<Run>(runs(size.width))
 }
 
 /// What [`keep_largest`] found.
@@ -39,54 +45,54 @@ pub struct Components {
     pub second: u32,
 }
 
+/// What [`fill_holes`] filled.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Holes {
+    /// Number of holes.
+    pub count: u32,
+    /// Area of all of them, px.
+    pub area: u32,
+}
+
 /// Clear everything but the largest 8-connected component; of equals, the first in raster order stays.
-pub fn keep_largest(bitmap: &mut Bitmap<'_>, scratch: &mut [Word]) -> Result<Components, CapacityError> {
-    let (mut rest, mut front) = split(bitmap.size(), scratch)?;
-    rest.copy_from(bitmap);
+///
+/// # Errors
+/// A [`CapacityError`] when there is too little scratch; nothing is changed then.
+pub fn keep_largest(bitmap: &mut Bitmap<'_>, scratch: Arena<'_>) -> Result<Components, CapacityError> {
+    let (mut front, rows) = split(bitmap.size(), scratch)?;
     let mut found = Components::default();
-    let mut seed_of_largest = None;
-    for at in places(bitmap.size()) {
-        while let Some(seed) = Seed::first(&rest, at) {
-            let area = flood(&mut rest, &mut front, seed, Connectivity::Eight);
-            found.count += 1;
-            if area > found.largest {
-                found.second = found.largest;
-                found.largest = area;
-                seed_of_largest = Some(seed);
-            } else {
-                found.second = found.second.max(area);
-            }
+    let mut largest: Option<Component> = None;
+    let ground = Ground::Object;
+    each_component(bitmap, ground, rows, |bitmap, next| {
+        found.count += 1;
+        let before = largest.replace(next);
+        let Some(mut other) = before else { return };
+        if other.area > next.area || other.area == next.area && other.is_before(&next) {
+            largest = before;
+            other = next;
         }
-    }
-    if let Some(seed) = seed_of_largest.filter(|_| found.count > 1) {
-        rest.copy_from(bitmap);
-        flood(&mut rest, &mut front, seed, Connectivity::Eight);
-        for (word, others) in bitmap.words_mut().iter_mut().zip(rest.words()) {
-            *word ^= others;
-        }
-    }
+        found.second = found.second.max(other.area);
+        Flood { bitmap, front: &mut front, ground }.take(other.first);
+    });
+    found.largest = largest.map_or(0, |largest| largest.area);
     Ok(found)
 }
 
-/// Set the pixels of every 4-connected hole of fewer than `below` pixels; returns how many holes that
-/// were. What is connected to the border of the image is background, not a hole.
-pub fn fill_holes(bitmap: &mut Bitmap<'_>, below: u32, scratch: &mut [Word]) -> Result<u32, CapacityError> {
-    let size = bitmap.size();
-    let (mut rest, mut front) = split(size, scratch)?;
-    bitmap.invert();
-    rest.copy_from(bitmap);
-    flood_from_border(&mut rest, &mut front);
-    let mut filled = 0;
-    for at in places(size) {
-        while let Some(seed) = Seed::first(&rest, at) {
-            if flood(&mut rest, &mut front, seed, Connectivity::Four) < below {
-                // The inverted bitmap still holds the hole: the same flood takes it out there.
-                flood(bitmap, &mut front, seed, Connectivity::Four);
-                filled += 1;
-            }
+/// Set the pixels of every 4-connected hole of fewer than `below` pixels; says what that were. What is
+/// connected to the border of the image is background, not a hole.
+///
+/// # Errors
+/// A [`CapacityError`] when there is too little scratch; nothing is changed then.
+pub fn fill_holes(bitmap: &mut Bitmap<'_>, below: u32, scratch: Arena<'_>) -> Result<Holes, CapacityError> {
+    let (mut front, rows) = split(bitmap.size(), scratch)?;
+    let mut filled = Holes::default();
+    let ground = Ground::Background;
+    each_component(bitmap, ground, rows, |bitmap, hole| {
+        if !hole.on_border && hole.area < below {
+            Flood { bitmap, front: &mut front, ground }.take(hole.first);
+            filled = Holes { count: filled.count + 1, area: filled.area + hole.area };
         }
-    }
-    bitmap.invert();
+    });
     Ok(filled)
 }
 
@@ -132,38 +138,35 @@ pub fn erode(bitmap: &mut Bitmap<'_>) {
     bitmap.invert();
 }
 
+/// What components are made of.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Connectivity {
-    Four,
-    Eight,
+enum Ground {
+    /// Set pixels, joined by their edges and corners.
+    Object,
+    /// Clear pixels, joined by their edges.
+    Background,
+}
+
+impl Ground {
+    /// What turns its pixels in a word into set bits, beyond the width others too.
+    const fn mask(self) -> Word {
+        match self {
+            Self::Object => 0,
+            Self::Background => Word::MAX,
+        }
+    }
 }
 
 /// Row and index of a word.
 type Place = (i32, usize);
 
-/// A pixel to flood from: a word with one bit set, and its place.
-#[derive(Clone, Copy)]
-struct Seed {
-    place: Place,
-    bit: Word,
-}
+type Rows<'a> = [&'a mut [Run]; 2];
 
-impl Seed {
-    fn first(rest: &Bitmap<'_>, place: Place) -> Option<Self> {
-        let word = at(rest.row(place.0), place.1);
-        (word != 0).then(|| Self { place, bit: word & word.wrapping_neg() })
-    }
-}
-
-fn places(size: Size) -> impl Iterator<Item = Place> {
-    (0..size.height as i32).flat_map(move |v| (0..size.row_words()).map(move |i| (v, i)))
-}
-
-fn split(size: Size, scratch: &mut [Word]) -> Result<(Bitmap<'_>, Bitmap<'_>), CapacityError> {
-    let limit = scratch.len();
-    let halves = scratch.split_at_mut_checked(size.words());
-    let (rest, front) = halves.ok_or(CapacityError { what: "words of scratch", limit })?;
-    Ok((Bitmap::new(size, rest)?, Bitmap::new(size, front)?))
+/// The scratch: a clear bitmap, and two rows of runs.
+fn split(size: Size, mut scratch: Arena<'_>) -> Result<(Bitmap<'_>, Rows<'_>), CapacityError> {
+    let front = Bitmap::new(size, scratch.take(size.words(), "words of scratch")?)?;
+    let mut row = || scratch.take(runs(size.width), "runs of a row");
+    Ok((front, [row()?, row()?]))
 }
 
 /// The box of words in which fresh pixels wait.
@@ -182,95 +185,80 @@ impl Span {
     }
 }
 
-/// Take the component of `seed` out of `rest`; returns its area. `front` is clear before and after.
-fn flood(rest: &mut Bitmap<'_>, front: &mut Bitmap<'_>, seed: Seed, connectivity: Connectivity) -> u32 {
-    let mut span = Span::EMPTY;
-    let area = reach(rest, front, seed.place, seed.bit, &mut span);
-    area + spread(rest, front, span, connectivity)
+/// Takes single components over to the other side: set pixels are cleared, clear ones set.
+struct Flood<'f, 'b, 's> {
+    bitmap: &'f mut Bitmap<'b>,
+    /// Pixels taken over but not yet gone on from; clear before and after.
+    front: &'f mut Bitmap<'s>,
+    ground: Ground,
 }
 
-/// Take the background that is connected to the border of the image out of `rest`.
-fn flood_from_border(rest: &mut Bitmap<'_>, front: &mut Bitmap<'_>) {
-    let size = rest.size();
-    let mut span = Span::EMPTY;
-    let last = size.width.saturating_sub(1);
-    for (v, i) in places(size) {
-        let whole = v == 0 || v as usize + 1 == size.height;
-        let first_column = Word::from(i == 0);
-        let last_column = if i == last / WORD_BITS { 1 << (last % WORD_BITS) } else { 0 };
-        let border = if whole { Word::MAX } else { first_column | last_column };
-        reach(rest, front, (v, i), border, &mut span);
-    }
-    spread(rest, front, span, Connectivity::Four);
-}
-
-/// Sweep down and up until no fresh pixel waits; returns the number of pixels gained.
-fn spread(rest: &mut Bitmap<'_>, front: &mut Bitmap<'_>, start: Span, connectivity: Connectivity) -> u32 {
-    let (mut waiting, mut down, mut gained) = (start, true, 0);
-    while waiting.rows.0 <= waiting.rows.1 {
-        let mut ahead = waiting;
-        waiting = Span::EMPTY;
-        let mut v = if down { ahead.rows.0 } else { ahead.rows.1 };
-        while (ahead.rows.0..=ahead.rows.1).contains(&v) {
-            let mut i = ahead.words.0;
-            while i <= ahead.words.1 {
-                let fresh = at(front.row(v), i);
-                if fresh == 0 {
-                    i += 1;
-                    continue;
-                }
-                front.row_mut(v)[i] = 0;
-                let run = complete_runs(fresh, rest.row(v)[i] | fresh);
-                gained += (run & !fresh).count_ones();
-                rest.row_mut(v)[i] &= !run;
-
-                let (above, below) = (v - 1, v + 1);
-                let (behind, before) = if down { (above, below) } else { (below, above) };
-                gained += reach_row(rest, front, (behind, i), run, connectivity, &mut waiting);
-                gained += reach_row(rest, front, (before, i), run, connectivity, &mut ahead);
-                gained += reach(rest, front, (v, i + 1), run >> (WORD_BITS - 1), &mut ahead);
-                if i > 0 {
-                    let west = reach(rest, front, (v, i - 1), run << (WORD_BITS - 1), &mut ahead);
-                    gained += west;
-                    if west > 0 {
+impl Flood<'_, '_, '_> {
+    /// Take over the component of a pixel. One of clear pixels must not lie on the border.
+    fn take(&mut self, pixel: Pixel) {
+        let (mut ahead, mut down) = (Span::EMPTY, true);
+        let (u, v) = (usize::from(pixel.u), i32::from(pixel.v));
+        self.reach((v, u / WORD_BITS), 1 << (u % WORD_BITS), &mut ahead);
+        // Down and up until no fresh pixel waits.
+        while ahead.rows.0 <= ahead.rows.1 {
+            let mut behind = Span::EMPTY;
+            let mut v = if down { ahead.rows.0 } else { ahead.rows.1 };
+            while (ahead.rows.0..=ahead.rows.1).contains(&v) {
+                let next = if down { v + 1 } else { v - 1 };
+                let mut i = ahead.words.0;
+                while i <= ahead.words.1 {
+                    let fresh = at(self.front.row(v), i);
+                    if fresh == 0 {
+                        i += 1;
+                        continue;
+                    }
+                    let run = self.take_runs((v, i), fresh);
+                    self.reach_row((2 * v - next, i), run, &mut behind);
+                    self.reach_row((next, i), run, &mut ahead);
+                    self.reach((v, i + 1), run >> (WORD_BITS - 1), &mut ahead);
+                    if i > 0 && self.reach((v, i - 1), run << (WORD_BITS - 1), &mut ahead) {
                         i -= 1;
                     }
                 }
+                v = next;
             }
-            v += if down { 1 } else { -1 };
+            (ahead, down) = (behind, !down);
         }
-        down = !down;
     }
-    gained
-}
 
-/// Reach from the pixels `run` of a row into the row `v` above or below it.
-fn reach_row(
-    rest: &mut Bitmap<'_>,
-    front: &mut Bitmap<'_>,
-    (v, i): Place,
-    run: Word,
-    connectivity: Connectivity,
-    span: &mut Span,
-) -> u32 {
-    if connectivity == Connectivity::Four {
-        return reach(rest, front, (v, i), run, span);
+    /// Take over the runs of the fresh pixels of a word, which need not wait any longer; returns both.
+    fn take_runs(&mut self, (v, i): Place, fresh: Word) -> Word {
+        self.front.row_mut(v)[i] = 0;
+        let word = &mut self.bitmap.row_mut(v)[i];
+        let run = complete_runs(fresh, *word ^ self.ground.mask() | fresh);
+        *word ^= run & !fresh;
+        run
     }
-    let west = if i > 0 { reach(rest, front, (v, i - 1), run << (WORD_BITS - 1), span) } else { 0 };
-    west + reach(rest, front, (v, i), run | run << 1 | run >> 1, span)
-        + reach(rest, front, (v, i + 1), run >> (WORD_BITS - 1), span)
-}
 
-/// Move those of `pixels` that `rest` still has to the front; returns how many.
-fn reach(rest: &mut Bitmap<'_>, front: &mut Bitmap<'_>, place: Place, pixels: Word, span: &mut Span) -> u32 {
-    let Some(left) = rest.row_mut(place.0).get_mut(place.1) else { return 0 };
-    let fresh = *left & pixels;
-    if fresh != 0 {
-        *left ^= fresh;
-        front.row_mut(place.0)[place.1] |= fresh;
-        span.include(place);
+    /// Reach from the pixels `run` of a row into the row `v` above or below it.
+    fn reach_row(&mut self, (v, i): Place, run: Word, span: &mut Span) {
+        if self.ground == Ground::Background {
+            self.reach((v, i), run, span);
+            return;
+        }
+        if i > 0 {
+            self.reach((v, i - 1), run << (WORD_BITS - 1), span);
+        }
+        self.reach((v, i), run | run << 1 | run >> 1, span);
+        self.reach((v, i + 1), run >> (WORD_BITS - 1), span);
     }
-    fresh.count_ones()
+
+    /// Take over those of `pixels` that are still there; returns whether there are any.
+    fn reach(&mut self, place: Place, pixels: Word, span: &mut Span) -> bool {
+        let Some(word) = self.bitmap.row_mut(place.0).get_mut(place.1) else { return false };
+        let fresh = (*word ^ self.ground.mask()) & pixels;
+        if fresh != 0 {
+            *word ^= fresh;
+            self.front.row_mut(place.0)[place.1] |= fresh;
+            span.include(place);
+        }
+        fresh != 0
+    }
 }
 
 /// Carry fill: the runs of `mask` that hold a pixel of `seed`, which must lie inside `mask`.

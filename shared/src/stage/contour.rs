@@ -17,7 +17,7 @@
 //! * **Not promised**: that the polygon is free of self-intersections where parts are thinner than 2 px.
 
 use crate::arena::{Arena, List};
-use crate::bitmap::{Bitmap, Grey};
+use crate::bitmap::{Bitmap, Grey, SetBits, WORD_BITS};
 use crate::fixed::{PX, hypot};
 use crate::limits::{CapacityError, push};
 use crate::point::{Direction, PixelPoint};
@@ -62,15 +62,14 @@ impl ContourLoop {
 #[repr(C)]
 pub struct EdgeCrossing {
     at: PixelPoint,
-    /// Pixels beyond, within reach: none on the image's border.
-    beyond: i32,
+    /// How far the next crossing is, 1/256 px, rounded down: less than four pixels.
+    to_next: u16,
+    /// Not 0 where the image ends.
+    border: u16,
 }
 
 /// The four axes, clockwise on the screen, from the inner to the outer pixel of a crack.
 const AXES: [(i32, i32); 4] = [(0, -1), (1, 0), (0, 1), (-1, 0)];
-
-/// Pixels on either side of a crack whose grey values are looked at.
-const REACH: usize = 2;
 
 /// Grey levels by which object and background must differ for an edge to be placed by them.
 const MIN_CONTRAST: i32 = 8;
@@ -100,17 +99,17 @@ pub fn contour(
     let mut seen = Bitmap::new(mask.size(), scratch.take(mask.size().words(), "words of scratch")?)?;
     let mut crossings = scratch.list("contour crossings");
     for v in 0..mask.size().height as i32 {
-        for i in 0..mask.size().row_words() {
+        for (i, word) in mask.row(v).iter().enumerate() {
             // Every loop has a crack with the clear pixel to the north: start at the first not yet seen.
-            let north_edges = mask.row(v)[i] & !crate::bitmap::at(mask.row(v - 1), i);
-            for bit in crate::bitmap::SetBits(north_edges) {
-                let u = (i * crate::bitmap::WORD_BITS + bit) as i32;
+            let north_edges = word & !mask.row(v - 1).get(i).copied().unwrap_or(0);
+            for bit in SetBits(north_edges) {
+                let u = (i * WORD_BITS + bit) as i32;
                 if !seen.get(u, v) {
                     trace(grey, mask, (u, v), &mut seen, &mut crossings)?;
                     if grey.is_none() {
                         soften(&mut crossings);
                     }
-                    resample(&crossings, points, loops)?;
+                    resample(&mut crossings, points, loops)?;
                 }
             }
         }
@@ -166,63 +165,66 @@ fn soften(crossings: &mut [EdgeCrossing]) {
     }
 }
 
-/// Where along `axis` the edge lies near the outer side of `pixel`.
+/// Where along `axis` the edge lies near the outer side of `pixel`: by the grey values of two pixels on
+/// either side, as far as they are there and on their side of the mask.
 fn place(grey: Option<Grey<'_>>, mask: &Bitmap<'_>, pixel: (i32, i32), axis: (i32, i32)) -> EdgeCrossing {
     let at = |k: i32| (pixel.0 + k * axis.0, pixel.1 + k * axis.1);
-    let run = |first: i32, step: i32, inside: bool| {
-        (0..REACH as i32)
-            .take_while(|k| {
-                let (u, v) = at(first + k * step);
-                mask.size().contains(u, v) && mask.get(u, v) == inside
-            })
-            .count() as i32
-    };
-    let (inner, outer) = (run(0, -1, true), run(1, 1, false));
+    let is_set = |k: i32| mask.get(at(k).0, at(k).1);
+    let is_there = |k: i32| mask.size().contains(at(k).0, at(k).1);
+    let border = !is_there(1);
     let mut shift = 0;
-    if let Some(grey) = grey.filter(|_| outer > 0) {
-        let level = |k: i32| {
-            let (u, v) = at(k);
-            i32::from(grey.get(u, v))
-        };
-        let (object, background) = (level(1 - inner), level(outer));
+    if let Some(grey) = grey.filter(|_| !border) {
+        let level = |k: i32| i32::from(grey.get(at(k).0, at(k).1));
+        let (two_inside, two_outside) = (is_set(-1), is_there(2) && !is_set(2));
+        let (object, background) = (level(-i32::from(two_inside)), level(1 + i32::from(two_outside)));
         let contrast = object - background;
         if contrast.abs() >= MIN_CONTRAST {
             let covered = |k: i32| ((level(k) - background) * PX / contrast).clamp(0, PX);
-            shift =
-                (1..outer).map(covered).sum::<i32>() - (2 - inner..=0).map(|k| PX - covered(k)).sum::<i32>();
+            let beyond = if two_outside { covered(1) } else { 0 };
+            let missing = if two_inside { PX - covered(0) } else { 0 };
+            shift = beyond - missing;
         }
     }
     let along = PX / 2 + shift.clamp(-PX * 3 / 4, PX * 3 / 4);
     EdgeCrossing {
         at: PixelPoint { u: pixel.0 * PX + along * axis.0, v: pixel.1 * PX + along * axis.1 },
-        beyond: outer,
+        to_next: 0,
+        border: border.into(),
     }
 }
 
 /// Append the loop with points at equal arc lengths of about 1 px and their normals.
 fn resample(
-    crossings: &[EdgeCrossing],
+    crossings: &mut [EdgeCrossing],
     points: &mut VecView<ContourPoint>,
     loops: &mut VecView<ContourLoop>,
 ) -> Result<(), CapacityError> {
-    let next = |i: usize| crossings[if i + 1 == crossings.len() { 0 } else { i + 1 }].at;
-    let segment = |i: usize| {
-        let (a, b) = (crossings[i].at, next(i));
-        hypot(b.u - a.u, b.v - a.v)
-    };
-    let length: i64 = (0..crossings.len()).map(|i| i64::from(segment(i))).sum();
+    let Some(first) = crossings.first().map(|c| c.at) else { return Ok(()) };
+    let mut length = 0;
+    for i in 0..crossings.len() {
+        let (here, next) = (crossings[i].at, crossings.get(i + 1).map_or(first, |c| c.at));
+        crossings[i].to_next = hypot(next.u - here.u, next.v - here.v) as u16;
+        length += i64::from(crossings[i].to_next);
+    }
     let len = (length / i64::from(PX)).max(MIN_LOOP as i64);
     let here = ContourLoop { start: points.len(), len: len as usize };
-    let (mut i, mut before) = (0, 0i64);
-    for k in 0..len {
-        let target = length * k / len;
-        while i + 1 < crossings.len() && before + i64::from(segment(i)) <= target {
-            before += i64::from(segment(i));
+    // Point k lies length * k / len along the loop, rounded down: so much beyond crossing i, and `carried`
+    // of len parts.
+    let (step, parts) = (length / len, length % len);
+    let (mut i, mut beyond, mut carried) = (0, 0, 0);
+    for _ in 0..len {
+        while i + 1 < crossings.len() && i64::from(crossings[i].to_next) <= beyond {
+            beyond -= i64::from(crossings[i].to_next);
             i += 1;
         }
-        let at = crossings[i].at.lerp(next(i), (target - before) as i32, segment(i));
-        let point = ContourPoint { at, normal: Direction::default(), border: crossings[i].beyond == 0 };
+        let (from, next) = (crossings[i], crossings.get(i + 1).map_or(first, |c| c.at));
+        let at = from.at.lerp(next, beyond as i32, from.to_next.into());
+        let point = ContourPoint { at, normal: Direction::default(), border: from.border != 0 };
         push(points, point, "contour points")?;
+        (beyond, carried) = (beyond + step, carried + parts);
+        if carried >= len {
+            (beyond, carried) = (beyond + 1, carried - len);
+        }
     }
     for i in here.range() {
         let normal = normal(here, i, |k| points[k].at);
@@ -233,10 +235,15 @@ fn resample(
 
 /// Outward normal at point `i` of a loop, given where its points are, within +-2^20.
 pub(crate) fn normal(l: ContourLoop, i: usize, at: impl Fn(usize) -> PixelPoint) -> Direction {
-    let (u, v) = TANGENT.iter().zip(1..).fold((0, 0), |(u, v), (weight, k)| {
-        let (a, b) = (at(l.step(i, -k)), at(l.step(i, k)));
-        (u + weight * (b.u - a.u), v + weight * (b.v - a.v))
-    });
+    let end = l.start + l.len;
+    let (mut before, mut after, mut u, mut v) = (i, i, 0, 0);
+    for weight in TANGENT {
+        before = if before == l.start { end - 1 } else { before - 1 };
+        after = if after + 1 == end { l.start } else { after + 1 };
+        let (a, b) = (at(before), at(after));
+        u += weight * (b.u - a.u);
+        v += weight * (b.v - a.v);
+    }
     Direction::of(v, -u).unwrap_or_default()
 }
 

@@ -20,12 +20,13 @@
 //!   polygons at omega 1, 1.5 % at omega 3), so only those shifts take part under which the most sets of
 //!   three agree.
 //!
-//! * **Cost**: 12^2 feature vectors; for the paper's, n^2 omega of them and n^3 triples.
+//! * **Cost**: 12 feature vectors a hull, whatever its size, and 12^2 distances of these; for the paper's, n^2
+//!   omega vectors and n^3 triples.
 
 use crate::fixed::{ONE, div_round};
 use crate::limits::HULL_CUTS;
 use crate::point::{PixelPoint, orient};
-use crate::stage::invariants::{Measure, e_omega};
+use crate::stage::invariants::{Measure, e_omega, feature_distance, feature_vector};
 use crate::stage::plane::AffineMap;
 use heapless::VecView;
 
@@ -74,10 +75,14 @@ impl CutMatch {
 /// `None` when a hull has no height.
 pub fn match_cuts(left: &[PixelPoint], right: &[PixelPoint]) -> Option<CutMatch> {
     let (left, right) = (cut(left)?, cut(right)?);
+    let features = |hull| core::array::from_fn(|i| feature_vector(hull, i, Measure::Logarithm));
+    let (of_left, of_right): ([_; CUT_VERTICES], [_; CUT_VERTICES]) = (features(&left), features(&right));
     let errors = core::array::from_fn(|s| {
-        let sum: u64 = (0..CUT_VERTICES)
-            .map(|i| e_omega((&left, i), (&right, i + s), OMEGA, Measure::Logarithm) >> 16)
-            .sum();
+        // e_omega of quadruplet i is the sum of the distances from i on.
+        let distances: [u64; CUT_VERTICES] =
+            core::array::from_fn(|i| feature_distance(&of_left[i], &of_right[(i + s) % CUT_VERTICES]));
+        let e_omega = |i| (0..OMEGA).map(|k| distances[(i + k) % CUT_VERTICES]).sum::<u64>();
+        let sum: u64 = (0..CUT_VERTICES).map(|i| e_omega(i) >> 16).sum();
         (sum / CUT_VERTICES as u64).min(u64::from(u32::MAX)) as u32
     });
     let least = (0..CUT_VERTICES).min_by_key(|&s| errors[s]).unwrap_or(0);

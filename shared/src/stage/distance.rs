@@ -12,14 +12,18 @@
 //! | meaning | from the pixel's centre to the nearest centre of a clear pixel; all outside is clear |
 //! | ranges | sides up to 4096 put the border within 2048 px: squares up to 2^22, distances up to 2^15 |
 //! | scratch | one [`Parabola`] per column and two more; one `u16` per pixel, which may become the plane |
-//! | cost | linear in the pixels, with one division per set pixel |
+//! | cost | linear in the set pixels, with one division at most for each that shapes the envelope; the rest of the plane is but cleared |
 //!
 //! The parabolas of a clear pixel touch zero, so what lies beyond one in its row is never nearer: every
-//! run of set pixels has an envelope of its own, between the two clear pixels that end it.
+//! run of set pixels has an envelope of its own, between the two clear pixels that end it. With `k` and `m` px
+//! to these, a parabola of height `g` crosses theirs at (k + g^2 / k) / 2 px on the one side and
+//! (m + g^2 / m) / 2 px on the other. It is below both somewhere only if these add up to less than k + m, that
+//! is, if g^2 < k m: in the inside of an object that is more high than wide, none is.
 
-use crate::bitmap::{Bitmap, Plane, WORD_BITS};
+use crate::bitmap::{Bitmap, Plane, WORD_BITS, Word};
 use crate::limits::CapacityError;
 use bytemuck::{Pod, Zeroable};
+use core::ops::Range;
 
 /// One pixel, in the unit of stored distances: 1/16 px.
 pub const DISTANCE_PX: u16 = 16;
@@ -30,24 +34,24 @@ pub const DISTANCE_PX: u16 = 16;
 pub struct Parabola {
     /// Position of its lowest point, px.
     apex: u16,
-    /// Distance along the column there, px.
-    height: u16,
     /// First position at which no other parabola is lower, px.
     from: u16,
+    /// Square of the distance along the column there, px^2.
+    least: u32,
 }
 
 impl Parabola {
     /// A value to fill scratch memory with.
-    pub const NONE: Self = Self { apex: 0, height: 0, from: 0 };
+    pub const NONE: Self = Self { apex: 0, from: 0, least: 0 };
 
     /// Its value at a position, px^2; below 2^25.
     const fn at(self, x: u16) -> u32 {
-        (self.apex.abs_diff(x) as u32).pow(2) + (self.height as u32).pow(2)
+        (self.apex.abs_diff(x) as u32).pow(2) + self.least
     }
 
     /// The last position at which it is not above `other`, whose apex lies further right; at most 2^16 - 2.
     fn last_before(self, other: Self) -> u16 {
-        let base = |p: Self| u32::from(p.apex).pow(2) + u32::from(p.height).pow(2);
+        let base = |p: Self| u32::from(p.apex).pow(2) + p.least;
         let last = base(other).saturating_sub(base(self)) / (2 * u32::from(other.apex - self.apex));
         last.min(u32::from(u16::MAX) - 1) as u16
     }
@@ -59,6 +63,9 @@ pub const fn scratch_parabolas(width: usize) -> usize {
 }
 
 /// The plane of distances in 1/16 px, isqrt(256 d^2), over `data`; 0 where the bitmap is clear.
+///
+/// # Errors
+/// A [`CapacityError`] when the memory is too short.
 pub fn distance<'p>(
     bitmap: &Bitmap<'_>,
     data: &'p mut [u16],
@@ -66,15 +73,19 @@ pub fn distance<'p>(
 ) -> Result<Plane<'p, u16>, CapacityError> {
     let mut plane = along_columns(bitmap, data)?;
     let envelope = check(bitmap, scratch)?;
-    for v in 0..bitmap.size().height {
-        let unit = u32::from(DISTANCE_PX).pow(2);
-        along_row(plane.row_mut(v), envelope, |_, pixel, square| *pixel = (unit * square).isqrt() as u16);
+    for v in rows(bitmap) {
+        for run in Runs::of(bitmap.row(v as i32)) {
+            along_run(&mut plane.row_mut(v)[run], envelope, |_, pixel, square| *pixel = root(square));
+        }
     }
     Ok(plane)
 }
 
 /// Squared distances, px^2, handed to `sink` row by row with the number of the row, 0 where the bitmap
 /// is clear. `row` holds one row; what `columns` holds afterwards has no meaning.
+///
+/// # Errors
+/// A [`CapacityError`] when the memory is too short.
 pub fn squared_distances(
     bitmap: &Bitmap<'_>,
     columns: &mut [u16],
@@ -89,7 +100,10 @@ pub fn squared_distances(
     let envelope = check(bitmap, scratch)?;
     for v in 0..bitmap.size().height {
         row.fill(0);
-        along_row(plane.row_mut(v), envelope, |u, _, square| row[u] = square);
+        for run in Runs::of(bitmap.row(v as i32)) {
+            let squares = &mut row[run.clone()];
+            along_run(&mut plane.row_mut(v)[run], envelope, |k, _, square| squares[k] = square);
+        }
         sink(v, row);
     }
     Ok(())
@@ -101,66 +115,149 @@ fn check<'s>(bitmap: &Bitmap<'_>, scratch: &'s mut [Parabola]) -> Result<&'s mut
     scratch.get_mut(..needed).ok_or(CapacityError { what: "parabolas of scratch", limit })
 }
 
+/// The rows from the first to the last one with a set pixel.
+fn rows(bitmap: &Bitmap<'_>) -> Range<usize> {
+    let first = bitmap.words().iter().position(|word| *word != 0);
+    let last = bitmap.words().iter().rposition(|word| *word != 0);
+    let row = |word: usize| word / bitmap.size().row_words();
+    first.zip(last).map_or(0..0, |(first, last)| row(first)..row(last) + 1)
+}
+
+/// The runs of set pixels of a row, from left to right.
+#[derive(Clone, Debug)]
+pub struct Runs<'a> {
+    row: &'a [Word],
+    /// Where to look on.
+    from: usize,
+}
+
+impl<'a> Runs<'a> {
+    /// Those of a row of a bitmap.
+    pub const fn of(row: &'a [Word]) -> Self {
+        Self { row, from: 0 }
+    }
+
+    /// The first pixel from `from` on at which the row, with all words changed by `flip`, is set.
+    fn next_set(&self, from: usize, flip: Word) -> Option<usize> {
+        let mut i = from / WORD_BITS;
+        let mut word = (self.row.get(i)? ^ flip) >> (from % WORD_BITS) << (from % WORD_BITS);
+        while word == 0 {
+            i += 1;
+            word = self.row.get(i)? ^ flip;
+        }
+        Some(i * WORD_BITS + word.trailing_zeros() as usize)
+    }
+}
+
+impl Iterator for Runs<'_> {
+    type Item = Range<usize>;
+
+    fn next(&mut self) -> Option<Range<usize>> {
+        let start = self.next_set(self.from, 0)?;
+        self.from = self.next_set(start, Word::MAX).unwrap_or(self.row.len() * WORD_BITS);
+        Some(start..self.from)
+    }
+}
+
 /// First pass: the distance to the nearest clear pixel of the same column, px.
 fn along_columns<'p>(bitmap: &Bitmap<'_>, data: &'p mut [u16]) -> Result<Plane<'p, u16>, CapacityError> {
     let size = bitmap.size();
     let limit = data.len();
     let pixels = data.get_mut(..size.pixels()).ok_or(CapacityError { what: "pixels in a plane", limit })?;
-    for v in 0..size.height {
+    pixels.fill(0);
+    for v in rows(bitmap) {
         let (above, here) = pixels.split_at_mut(v * size.width);
-        let above = above.rchunks_exact(size.width.max(1)).next().unwrap_or(&[]);
-        for (u, out) in here.iter_mut().take(size.width).enumerate() {
-            let set = (bitmap.row(v as i32)[u / WORD_BITS] >> (u % WORD_BITS) & 1) as u16;
-            *out = set * (above.get(u).copied().unwrap_or(0) + 1);
+        for run in Runs::of(bitmap.row(v as i32)) {
+            let here = &mut here[run.clone()];
+            match above.rchunks_exact(size.width).next() {
+                Some(above) => here.iter_mut().zip(&above[run]).for_each(|(out, above)| *out = above + 1),
+                None => here.fill(1),
+            }
         }
     }
-    for v in (0..size.height).rev() {
+    for v in rows(bitmap).rev() {
         let (here, below) = pixels[v * size.width..].split_at_mut(size.width);
-        for (u, out) in here.iter_mut().enumerate() {
-            *out = (*out).min(below.get(u).copied().unwrap_or(0) + 1);
+        for run in Runs::of(bitmap.row(v as i32)) {
+            let here = &mut here[run.clone()];
+            match below.get(run) {
+                Some(below) => {
+                    here.iter_mut().zip(below).for_each(|(out, below)| *out = (*out).min(below + 1));
+                }
+                None => here.fill(1),
+            }
         }
     }
     Plane::over(size, data)
 }
 
-/// Second pass over one row: `emit` gets the column, the entry of the first pass to overwrite, and the
-/// squared distance of every set pixel.
-fn along_row(row: &mut [u16], envelope: &mut [Parabola], mut emit: impl FnMut(usize, &mut u16, u32)) {
-    let mut u = 0;
-    while u < row.len() {
-        let length = row[u..].iter().take_while(|&&g| g != 0).count();
-        let run = &mut row[u..u + length];
-        let mut top = lower_envelope(run, envelope);
-        for (k, pixel) in run.iter_mut().enumerate().rev() {
-            let x = k as u16 + 1;
-            while top > 0 && envelope[top].from > x {
-                top -= 1;
-            }
-            emit(u + k, pixel, envelope[top].at(x));
+/// Second pass over one run: `emit` gets the place in the run, the entry of the first pass to overwrite, and
+/// the squared distance of every pixel.
+fn along_run(run: &mut [u16], envelope: &mut [Parabola], mut emit: impl FnMut(usize, &mut u16, u32)) {
+    let top = lower_envelope(run, envelope);
+    let mut until = run.len() as u16;
+    for part in envelope[..=top].iter().rev() {
+        let from = part.from.max(1);
+        for x in from..=until {
+            emit(usize::from(x) - 1, &mut run[usize::from(x) - 1], part.at(x));
         }
-        u += length + 1;
+        until = from - 1;
     }
 }
 
 /// The lower envelope of a run and the two clear pixels around it, from left to right; returns the index
 /// of its last part.
 fn lower_envelope(run: &[u16], envelope: &mut [Parabola]) -> usize {
-    if run.is_empty() {
-        return 0;
-    }
     // The clear pixel before the run is 0 at position 0: nothing ever removes it.
-    envelope[0] = Parabola::default();
+    envelope[0] = Parabola::NONE;
     let mut top = 0;
-    for (k, &height) in run.iter().chain(&[0]).enumerate() {
-        let mut next = Parabola { apex: k as u16 + 1, height, from: 0 };
-        while top > 0 && envelope[top].at(envelope[top].from) > next.at(envelope[top].from) {
-            top -= 1;
+    let end = run.len() as u32 + 1;
+    for (x, &height) in (1..).zip(run.iter().chain(&[0])) {
+        let least = u32::from(height).pow(2);
+        if least != 0 && least >= x * (end - x) {
+            continue;
         }
-        next.from = envelope[top].last_before(next) + 1;
+        let mut next = Parabola { apex: x as u16, from: 0, least };
+        let mut last = envelope[top];
+        while top > 0 && last.at(last.from) > next.at(last.from) {
+            top -= 1;
+            last = envelope[top];
+        }
+        next.from = last.last_before(next) + 1;
         if usize::from(next.from) <= run.len() {
             top += 1;
             envelope[top] = next;
         }
     }
     top
+}
+
+/// Distances of squares below this are read off.
+const SMALL: usize = 1024;
+
+/// The distances of small squares.
+static ROOTS: [u16; SMALL] = {
+    let mut roots = [0; SMALL];
+    let mut square = 0;
+    while square < SMALL {
+        roots[square] = (UNIT * square as u32).isqrt() as u16;
+        square += 1;
+    }
+    roots
+};
+
+/// 1 px^2, in the unit of squared distances.
+const UNIT: u32 = (DISTANCE_PX as u32).pow(2);
+
+/// isqrt(256 d^2) of d^2 below 2^24: beyond the small squares one step of Newton's from the root of a square
+/// 4^k times smaller, which is 2^k times smaller and at least 256. That is off by 1/512 at most, so that the
+/// step ends less than one above the root of anything below 2^32, and never below it.
+fn root(square: u32) -> u16 {
+    if let Some(&root) = ROOTS.get(square as usize) {
+        return root;
+    }
+    let k = (u32::BITS - SMALL.ilog2() - square.leading_zeros()).div_ceil(2);
+    let guess = u32::from(ROOTS[(square >> (2 * k)) as usize] + 1) << k;
+    let square = UNIT * square;
+    let root = (guess + square / guess) / 2;
+    (root - u32::from(root * root > square)) as u16
 }

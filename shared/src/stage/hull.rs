@@ -34,10 +34,8 @@ pub struct RowExtent {
 
 /// The outermost set pixels of each row that has any, by their centres.
 pub fn bitmap_extents(bitmap: &Bitmap<'_>) -> impl Iterator<Item = RowExtent> {
-    (0..bitmap.size().height).filter_map(move |v| {
-        let (first, last) = bitmap.row_span(v)?;
-        Some(RowExtent { v: v as i32 * PX, left: first as i32 * PX, right: last as i32 * PX })
-    })
+    let at = |pixels: usize| pixels as i32 * PX;
+    bitmap.spans().map(move |(v, first, last)| RowExtent { v: at(v), left: at(first), right: at(last) })
 }
 
 /// The convex hull of the rows; replaces what `out` held.
@@ -48,8 +46,11 @@ pub fn convex_hull(
     extents: impl IntoIterator<Item = RowExtent>,
     out: &mut VecView<PixelPoint>,
 ) -> Result<(), CapacityError> {
-    let limit = out.capacity();
-    let overflow = CapacityError { what: "hull vertices", limit };
+    let overflow = CapacityError { what: "hull vertices", limit: out.capacity() };
+    let extents = extents.into_iter();
+    // A chain has a vertex a row at most.
+    let most = extents.size_hint().1.map_or(usize::MAX, |rows| rows.saturating_mul(2));
+    let limit = out.capacity().min(most);
     out.clear();
     out.resize_default(limit).map_err(|_| overflow)?;
     let points = out.as_mut_slice();

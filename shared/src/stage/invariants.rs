@@ -26,6 +26,9 @@ pub enum Measure {
 /// How far a vertex may be off, 1/256 px.
 const VERTEX_NOISE: i64 = PX as i64 / 2;
 
+/// The areas whose ratios these are.
+const PAIRS: [(usize, usize); 6] = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
+
 /// The six ratios I12, I13, I14, I23, I24, I34 of a quadruplet, 1/65536.
 pub type FeatureVector = [i32; 6];
 
@@ -40,21 +43,25 @@ pub fn feature_vector(polygon: &[PixelPoint], i: usize, measure: Measure) -> Fea
     let [a, b, c, d] = [0, 1, 2, 3].map(|k| polygon[(i + k) % n]);
     let areas =
         [orient(a, b, c), orient(a, b, d), orient(a, c, d), orient(b, c, d)].map(|s| s.unsigned_abs().max(1));
-    let chord = a.distance(c).max(b.distance(d)).max(a.distance(d));
-    let noise = (i64::from(chord) * VERTEX_NOISE) as u64;
-    let logarithms = areas.map(|s| log2(s + noise));
-    let mut features = [0; 6];
-    let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
-    for (feature, (k, l)) in features.iter_mut().zip(pairs) {
-        *feature = match measure {
-            Measure::Ratio => {
-                let ratio = (u128::from(areas[k]) << 16) / u128::from(areas[l]);
-                ratio.clamp(1 << 8, 1 << 24) as i32
-            }
-            Measure::Logarithm => (logarithms[k] - logarithms[l]).clamp(-8 * ONE, 8 * ONE),
-        };
+    match measure {
+        Measure::Ratio => PAIRS.map(|(k, l)| {
+            // Areas below 2^44, so the shift stays below 2^60.
+            let ratio = (areas[k] << 16) / areas[l];
+            ratio.clamp(1 << 8, 1 << 24) as i32
+        }),
+        Measure::Logarithm => {
+            let chord = a.distance(c).max(b.distance(d)).max(a.distance(d));
+            let noise = (i64::from(chord) * VERTEX_NOISE) as u64;
+            let logarithms = areas.map(|s| log2(s + noise));
+            PAIRS.map(|(k, l)| (logarithms[k] - logarithms[l]).clamp(-8 * ONE, 8 * ONE))
+        }
     }
-    features
+}
+
+/// Squared distance of two feature vectors, in 1/2^32.
+pub fn feature_distance(left: &FeatureVector, right: &FeatureVector) -> u64 {
+    let square = |d: u32| u64::from(d) * u64::from(d);
+    left.iter().zip(right).map(|(a, b)| square(a.abs_diff(*b))).sum()
 }
 
 /// e_omega(i, j): the squared distance of `omega` consecutive feature vectors, from quadruplet `i` of the
@@ -65,12 +72,8 @@ pub fn e_omega(
     omega: usize,
     measure: Measure,
 ) -> u64 {
-    (0..omega)
-        .map(|k| {
-            let (a, b) = (feature_vector(left, i + k, measure), feature_vector(right, j + k, measure));
-            a.iter().zip(b).map(|(a, b)| u64::from(a.abs_diff(b)).pow(2)).sum::<u64>()
-        })
-        .sum()
+    let features = |k| (feature_vector(left, i + k, measure), feature_vector(right, j + k, measure));
+    (0..omega).map(features).map(|(a, b)| feature_distance(&a, &b)).sum()
 }
 
 #[cfg(test)]

@@ -10,6 +10,8 @@ pub mod clean;
 pub mod boundary;
 pub mod contour;
 pub mod distance;
+pub mod parallel_thinning;
+pub mod sequential_thinning;
 pub mod thinning;
 pub mod graph;
 pub mod prune;

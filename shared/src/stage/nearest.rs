@@ -3,11 +3,13 @@
 //! "The boundary points lying within the area of the convex hull of the matched vertices will also
 //! correspond": each left point is mapped, and the nearest right point is its partner.
 //!
-//! * **Cost**: left points times right points.
+//! * **Cost**: linear in the number of points, where neighbours in a list are neighbours in the plane.
 
+use crate::arena::Arena;
 use crate::limits::{CapacityError, push};
 use crate::point::PixelPoint;
 use crate::stage::plane::AffineMap;
+use crate::strips::{Disc, Strips};
 use heapless::VecView;
 
 /// A left point and its right partner.
@@ -22,19 +24,28 @@ pub struct Pair {
 /// Pair each left point with the right point nearest to its image; of equals, the first.
 ///
 /// # Errors
-/// A [`CapacityError`] when `pairs` is too short.
+/// A [`CapacityError`] when `pairs` or the scratch is too short.
 pub fn pair_nearest<R: Iterator<Item = PixelPoint>>(
     left: impl Iterator<Item = PixelPoint>,
     right: impl Fn() -> R,
     map: &AffineMap,
+    mut scratch: Arena<'_>,
     pairs: &mut VecView<Pair>,
 ) -> Result<(), CapacityError> {
     pairs.clear();
+    let points = scratch.take::<PixelPoint>(right().count(), "right points")?;
+    points.iter_mut().zip(right()).for_each(|(place, point)| *place = point);
+    let points = &*points;
+    let strips = Strips::new(points, &mut scratch)?;
+    let Some(mut nearest) = points.first() else { return Ok(()) };
     for left in left {
-        let image = map.apply(left);
-        if let Some(right) = right().min_by_key(|r| image.distance_squared(*r)) {
-            push(pairs, Pair { left, right }, "pairs")?;
-        }
+        // The last partner is near this one; one just as far away may come before it.
+        let centre = map.apply(left);
+        let squared = centre.distance_squared(*nearest) + 1;
+        strips.walk(Disc { centre, squared }, |_, right, disc| {
+            (nearest, disc.squared) = (right, centre.distance_squared(*right));
+        });
+        push(pairs, Pair { left, right: *nearest }, "pairs")?;
     }
     Ok(())
 }

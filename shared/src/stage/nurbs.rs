@@ -27,7 +27,7 @@
 
 use crate::arena::Arena;
 use crate::envelope::{ENTRY_BITS, Envelope};
-use crate::fixed::{ONE, PX, div_round, saturate};
+use crate::fixed::{ONE, PX, div_floor, div_round, saturate};
 use crate::limits::{CapacityError, push};
 use crate::stage::branch::{Ball, Sample};
 use heapless::VecView;
@@ -232,7 +232,7 @@ fn accumulate(
     let drop = BASIS_BITS + FINE_BITS + bits - SIDE_BITS;
 
     sides.fill([0; 4]);
-    let mut cursor = Cursor::default();
+    let mut cursor = Cursor { segment: 0, start: 0, across: line.chord(0) };
     let samples = if closed { pieces } else { pieces + 1 };
     for i in 0..samples {
         let (channels, weight) = line.at(part(line.length, i, pieces), &mut cursor);
@@ -279,16 +279,18 @@ fn basis(spans: usize, closed: bool, t: i32) -> (usize, [i64; 4]) {
     let span = (t >> 16).clamp(0, spans as i32 - 1);
     let knot = |offset: i32| {
         let knot = span + offset;
-        ((if closed { knot } else { knot.clamp(0, spans as i32) }) as i64) << 16
+        if closed { knot } else { knot.clamp(0, spans as i32) }
     };
-    let t = t as i64;
     let mut values = [1 << BASIS_BITS, 0, 0, 0];
     for degree in 1..=DEGREE {
         let mut carried = 0;
         for (r, value) in values.iter_mut().enumerate().take(degree) {
-            let right = knot(1 + r as i32);
             let left = knot(1 + r as i32 - degree as i32);
-            let rising = div_round(*value * (t - left), right - left);
+            let spans = (knot(1 + r as i32) - left) as u32;
+            // value (t - left) / (right - left), rounded: the shift leaves 32 bits, since the function is at most
+            // 2^30 and t at most 1 to 3 spans from the left.
+            let part = *value as u64 * (t - (left << 16)) as u64 + (u64::from(spans) << 15);
+            let rising = i64::from((part >> 16) as u32 / spans);
             *value += carried - rising;
             carried = rising;
         }
@@ -299,7 +301,9 @@ fn basis(spans: usize, closed: bool, t: i32) -> (usize, [i64; 4]) {
 
 /// `length * i / pieces`, rounded down, for 0 <= i <= pieces, without the large product.
 const fn part(length: i64, i: i64, pieces: i64) -> i64 {
-    length / pieces * i + length % pieces * i / pieces
+    let (length, i, pieces) = (length as u64, i as u64, pieces as u64);
+    let whole = div_floor(length, pieces);
+    (whole * i + div_floor((length - whole * pieces) * i, pieces)) as i64
 }
 
 /// Distance of two centres in (u, v), 1/65536 px; below 2^30.
@@ -318,11 +322,11 @@ struct Polyline<'a> {
     length: i64,
 }
 
-/// A segment of a polyline and the arc where it starts.
-#[derive(Default)]
+/// A segment of a polyline, the arc where it starts, and its length.
 struct Cursor {
     segment: usize,
     start: i64,
+    across: i64,
 }
 
 impl<'a> Polyline<'a> {
@@ -348,12 +352,12 @@ impl<'a> Polyline<'a> {
 
     /// Channels (1/4096 px) and weight at an arc no less than the last one asked for.
     fn at(&self, arc: i64, cursor: &mut Cursor) -> ([i64; 4], i64) {
-        let mut across = self.chord(cursor.segment);
-        while arc > cursor.start + across && cursor.segment + 1 < self.segments() {
-            cursor.start += across;
+        while arc > cursor.start + cursor.across && cursor.segment + 1 < self.segments() {
+            cursor.start += cursor.across;
             cursor.segment += 1;
-            across = self.chord(cursor.segment);
+            cursor.across = self.chord(cursor.segment);
         }
+        let across = cursor.across;
         let beyond = (arc - cursor.start).min(across);
         let (a, b) = self.ends(cursor.segment);
         let between = |a: i64, b: i64| a + div_round((b - a) * beyond, across);

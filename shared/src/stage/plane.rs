@@ -6,9 +6,9 @@
 //!
 //! * **How**: least squares with Cauchy weights 1 / (1 + (e / 1 px)^2), re-weighted six times, and
 //!   a ridge of 1 px^2 on both slopes, so that a narrow object does not get a wild slope.
-//! * **Bounds**: coordinates within 2^20 (1/256 px), at most 2^16 observations of weight at most 2^14:
-//!   every sum stays below 2^100 of `i128`.
-//! * **Cost**: linear in the number of observations.
+//! * **Bounds**: coordinates and values within 2^20 (1/256 px), at most 2^16 observations of weight at most 2^14:
+//!   plain sums stay below 2^51, sums of products below 2^72.
+//! * **Cost**: linear in the number of observations, one 32-bit division each a round.
 
 use crate::fixed::{ONE, saturate};
 use crate::point::PixelPoint;
@@ -53,12 +53,9 @@ impl ImagePlane {
     /// The robust fit, or `None` without an observation of positive weight.
     #[expect(clippy::needless_pass_by_value, reason = "iterators are handed over, and cloned for each pass")]
     pub fn fit(observations: impl Iterator<Item = Observation> + Clone) -> Option<Self> {
-        let mut plane = Self::fit_once(observations.clone().map(|o| (o, i128::from(o.weight))))?;
+        let mut plane = Self::fit_once(observations.clone())?;
         for _ in 0..ROUNDS {
-            let weighted = observations.clone().map(|o| {
-                let error = i128::from(o.value - plane.at(o.at));
-                (o, (i128::from(o.weight) << 16) / (PX2 + error * error))
-            });
+            let weighted = observations.clone().map(|o| plane.reweighted(o));
             // Weights may all round to nothing when nothing fits: the last plane is then the answer.
             match Self::fit_once(weighted) {
                 Some(better) => plane = better,
@@ -68,26 +65,37 @@ impl ImagePlane {
         Some(plane)
     }
 
+    /// The observation with a weight that tells how far from the plane it is.
+    fn reweighted(&self, o: Observation) -> Observation {
+        let error = (i64::from(o.value) - i64::from(self.at(o.at))).unsigned_abs();
+        // From 2^15 on the weight, 2^14 / (1 + 2^14) at most, rounds to nothing; below, all is below 2^31.
+        let weight = if error < 1 << 15 {
+            ((o.weight.cast_unsigned() << 16) / (PX2 as u32 + error as u32 * error as u32)).cast_signed()
+        } else {
+            0
+        };
+        Observation { weight, ..o }
+    }
+
     /// Weighted least squares with the ridge.
-    #[expect(clippy::needless_pass_by_value, reason = "iterators are handed over, and cloned for each pass")]
-    fn fit_once(weighted: impl Iterator<Item = (Observation, i128)> + Clone) -> Option<Self> {
-        let sum = |f: &dyn Fn(&Observation) -> i128| weighted.clone().map(|(o, w)| w * f(&o)).sum::<i128>();
-        let total = sum(&|_| 1);
+    fn fit_once(observations: impl Iterator<Item = Observation>) -> Option<Self> {
+        let sums = observations.fold(Sums::default(), Sums::with);
+        let total = sums.weight;
         if total <= 0 {
             return None;
         }
-        let mean = |f: &dyn Fn(&Observation) -> i128| (sum(f) / total) as i32;
-        let origin = PixelPoint { u: mean(&|o| o.at.u.into()), v: mean(&|o| o.at.v.into()) };
-        let level = mean(&|o| o.value.into());
-        let (u, v, d) = (
-            |o: &Observation| i128::from(o.at.u - origin.u),
-            |o: &Observation| i128::from(o.at.v - origin.v),
-            |o: &Observation| i128::from(o.value - level),
-        );
-        let ridge = total * PX2;
-        let (uu, vv, uv) =
-            (sum(&|o| u(o) * u(o)) + ridge, sum(&|o| v(o) * v(o)) + ridge, sum(&|o| u(o) * v(o)));
-        let (ud, vd) = (sum(&|o| u(o) * d(o)), sum(&|o| v(o) * d(o)));
+        let mean = |sum: i64| (sum / total) as i32;
+        let (origin, level) = (PixelPoint { u: mean(sums.u), v: mean(sums.v) }, mean(sums.d));
+        let [weight, mean_u, mean_v, mean_d] =
+            [total, origin.u.into(), origin.v.into(), level.into()].map(i128::from);
+        // sum w (x - m) (y - n) = sum w x y - m sum w y - n sum w x + m n sum w, whatever m and n are.
+        let centred = |xy: i128, (x, m): (i64, i128), (y, n): (i64, i128)| {
+            xy - m * i128::from(y) - n * i128::from(x) + m * n * weight
+        };
+        let (u, v, d) = ((sums.u, mean_u), (sums.v, mean_v), (sums.d, mean_d));
+        let ridge = weight * PX2;
+        let (uu, vv) = (centred(sums.uu, u, u) + ridge, centred(sums.vv, v, v) + ridge);
+        let (uv, ud, vd) = (centred(sums.uv, u, v), centred(sums.ud, u, d), centred(sums.vd, v, d));
         // Sums reach 2^72; 40 bits are plenty for a slope, and keep the products below within i128.
         let excess = (128 - uu.max(vv).leading_zeros()).saturating_sub(40);
         let [uu, vv, uv, ud, vd] = [uu, vv, uv, ud, vd].map(|s| s >> excess);
@@ -97,6 +105,39 @@ impl ImagePlane {
         }
         let slope = |n: i128| ((n << 16) / determinant).clamp(-(1 << 24), 1 << 24) as i32;
         Some(Self { origin, level, slope_u: slope(ud * vv - vd * uv), slope_v: slope(vd * uu - ud * uv) })
+    }
+}
+
+/// Sums over weighted observations: of weights, of a coordinate or the value d, and of products of two.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    weight: i64,
+    u: i64,
+    v: i64,
+    d: i64,
+    uu: i128,
+    vv: i128,
+    uv: i128,
+    ud: i128,
+    vd: i128,
+}
+
+impl Sums {
+    /// With one more; each of its terms is below 2^56.
+    fn with(self, o: Observation) -> Self {
+        let [w, u, v, d] = [o.weight, o.at.u, o.at.v, o.value].map(i64::from);
+        let (wu, wv) = (w * u, w * v);
+        Self {
+            weight: self.weight + w,
+            u: self.u + wu,
+            v: self.v + wv,
+            d: self.d + w * d,
+            uu: self.uu + i128::from(wu * u),
+            vv: self.vv + i128::from(wv * v),
+            uv: self.uv + i128::from(wu * v),
+            ud: self.ud + i128::from(wu * d),
+            vd: self.vd + i128::from(wv * d),
+        }
     }
 }
 

@@ -98,7 +98,7 @@ const MAX_TURN: i32 = UNIT * 48 / 100;
 /// How many crossings [`row_crossings`] will find in so many rows.
 pub fn count_crossings(points: &[ContourPoint], loops: &[ContourLoop], offset: i32, rows: usize) -> usize {
     let mut count = 0;
-    each_crossing(points, loops, offset, rows, |_| count += 1);
+    each_crossing(points, loops, offset, rows, |_, _, _| count += 1);
     count
 }
 
@@ -115,15 +115,17 @@ pub fn row_crossings<'a>(
 ) -> Rows<'a> {
     first.fill(0);
     let rows = first.len().saturating_sub(1);
-    each_crossing(points, loops, offset, rows, |c| first[usize::from(c.v) + 1] += 1);
+    each_crossing(points, loops, offset, rows, |_, _, v| first[v as usize + 1] += 1);
     for v in 0..rows {
         first[v + 1] += first[v];
     }
     // Counting sort in place: `first` moves to each row's end while its crossings arrive, and back.
-    each_crossing(points, loops, offset, rows, |c| {
-        let slot = &mut first[usize::from(c.v)];
+    each_crossing(points, loops, offset, rows, |i, [a, b], v| {
+        let slot = &mut first[v as usize];
         if let Some(place) = crossings.get_mut(*slot as usize) {
-            *place = c;
+            let (run, rise) = (v * PX + offset - a.v, b.v - a.v);
+            let u = a.u + div_round(i64::from(b.u - a.u) * i64::from(run), rise.into()) as i32;
+            *place = RowCrossing { u, index: i as u32, v: v as u16, heading: rise.signum() as i16 };
         }
         *slot += 1;
     });
@@ -141,13 +143,14 @@ pub fn row_crossings<'a>(
     Rows { first, crossings }
 }
 
-/// Walk along the loops and report where they cross a row.
+/// Walk along the loops and report where they cross a row: the number of the point before, it and the next
+/// one, and the row.
 fn each_crossing(
     points: &[ContourPoint],
     loops: &[ContourLoop],
     offset: i32,
     rows: usize,
-    mut report: impl FnMut(RowCrossing),
+    mut report: impl FnMut(usize, [PixelPoint; 2], i32),
 ) {
     for l in loops {
         for i in l.range() {
@@ -157,13 +160,7 @@ fn each_crossing(
             let from = low.div_euclid(PX) + i32::from(low.rem_euclid(PX) != 0);
             let to = high.div_euclid(PX) + i32::from(high.rem_euclid(PX) != 0);
             for v in from.max(0)..to.min(rows as i32) {
-                let (run, rise) = (v * PX + offset - a.v, b.v - a.v);
-                report(RowCrossing {
-                    u: a.lerp(b, run, rise).u,
-                    index: i as u32,
-                    v: v as u16,
-                    heading: rise.signum() as i16,
-                });
+                report(i, [a, b], v);
             }
         }
     }
@@ -224,11 +221,12 @@ pub fn match_rows(
         push(matches, blank, "contour matches")?;
     }
     let skip = skip_cost(left_points);
+    let mut steps = [[Step::SkipRight; ROW_CROSSINGS + 1]; ROW_CROSSINGS + 1];
     let mut statistics = RowStatistics::default();
     for v in 0..left.len() {
         let (a, b) = (left.matched(v), right.matched(v));
         let mut known = 0;
-        align((a, b), plane, skip, |i, j| {
+        align((a, b), plane, skip, &mut steps, |i, j| {
             known += u32::from(!left_points[a[i].index as usize].border);
             record(&a[i], &b[j], left_points, right_points, matches);
         });
@@ -260,31 +258,34 @@ fn skip_cost(points: &[ContourPoint]) -> i32 {
     ((span(|p| p.at.u) + span(|p| p.at.v)) / (2 * SKIP_SHARE)).max(LEAST_SKIP)
 }
 
+/// What the last step of an alignment is.
+#[derive(Clone, Copy, PartialEq)]
+enum Step {
+    Pair,
+    SkipLeft,
+    SkipRight,
+}
+
+/// The last step of the cheapest alignment of so many left with so many right crossings.
+type Steps = [[Step; ROW_CROSSINGS + 1]; ROW_CROSSINGS + 1];
+
 /// Align two rows of crossings in order at the least cost, and report the pairs; `skip` is the cost of
-/// leaving one out.
+/// leaving one out. What is in `steps` does not matter: clearing it would cost more than a common row.
 fn align(
     (a, b): (&[RowCrossing], &[RowCrossing]),
     plane: &ImagePlane,
     skip: i32,
+    steps: &mut Steps,
     mut pair: impl FnMut(usize, usize),
 ) {
-    #[derive(Clone, Copy, PartialEq)]
-    enum Step {
-        Pair,
-        SkipLeft,
-        SkipRight,
-    }
-    const N: usize = ROW_CROSSINGS + 1;
-    let mut cost = [0i32; N];
-    let mut steps = [[Step::SkipRight; N]; N];
-    for (j, c) in cost.iter_mut().enumerate() {
+    let mut cost = [0i32; ROW_CROSSINGS + 1];
+    for (j, c) in cost.iter_mut().enumerate().take(b.len() + 1) {
         *c = j as i32 * skip;
     }
     for (i, x) in a.iter().enumerate() {
         let expected = x.u - plane.at(PixelPoint { u: x.u, v: i32::from(x.v) * PX });
         let mut diagonal = cost[0];
         cost[0] += skip;
-        steps[i + 1][0] = Step::SkipLeft;
         for (j, y) in b.iter().enumerate() {
             let above = cost[j + 1];
             let (mut best, mut step) = (above + skip, Step::SkipLeft);
@@ -332,19 +333,33 @@ fn record(
 fn reject_outliers(trusted: &mut List<'_, Trusted>) {
     let n = trusted.len();
     if n > 2 * MEDIAN_REACH {
-        let mut window = [0i32; 2 * MEDIAN_REACH + 1];
+        // The window around match 0, sorted; with each step one leaves it and one enters.
+        let mut window = core::array::from_fn(|w| trusted[(n + w - MEDIAN_REACH) % n].excess);
+        window.sort_unstable();
         for k in 0..n {
-            for (w, slot) in window.iter_mut().enumerate() {
-                *slot = trusted[(k + n + w - MEDIAN_REACH) % n].excess;
-            }
-            window.sort_unstable();
             // Only the weight changes here, so that every median sees the same neighbours.
             if (trusted[k].excess - window[MEDIAN_REACH]).abs() > OUTLIER {
                 trusted[k].weight = 0;
             }
+            let (leaves, enters) = ((k + n - MEDIAN_REACH) % n, (k + 1 + MEDIAN_REACH) % n);
+            replace(&mut window, trusted[leaves].excess, trusted[enters].excess);
         }
     }
     trusted.retain(|t| t.weight > 0);
+}
+
+/// Take a value out of a sorted window that holds it, and put another in.
+fn replace(window: &mut [i32; 2 * MEDIAN_REACH + 1], old: i32, new: i32) {
+    let mut place = window.iter().position(|w| *w == old).unwrap_or(0);
+    while place + 1 < window.len() && window[place + 1] < new {
+        window[place] = window[place + 1];
+        place += 1;
+    }
+    while place > 0 && window[place - 1] > new {
+        window[place] = window[place - 1];
+        place -= 1;
+    }
+    window[place] = new;
 }
 
 /// The average of match `k` and its neighbours within a few pixels of arc: (excess, turn).

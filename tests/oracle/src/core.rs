@@ -14,7 +14,7 @@ use shared::stage::medial::MedialBall;
 use shared::stage::nearest::Pair;
 use shared::stage::nurbs::{Control, MAX_CONTROLS};
 use shared::stage::rows::ContourMatch;
-use shared::stage::thinning::scratch_order;
+use shared::stage::sequential_thinning::scratch_order;
 
 /// `picture[v][u]`: a grey value.
 pub type Picture = Vec<Vec<u8>>;

@@ -24,6 +24,30 @@ pub fn medial_radius(points: &[(At, At)], i: usize, most: f64) -> f64 {
     low
 }
 
+/// A contour point: where, 1/256 px, and its outward normal, 1/16384.
+pub type Rim = ([i64; 2], [i64; 2]);
+
+/// The ball that grows from `points[i]` in whole numbers, by trying every point in turn: centre, radius and contact.
+/// Nothing where no point stops it, or one lies more than `slack` deep in it.
+pub fn medial_ball(points: &[Rim], i: usize, slack: i64) -> Option<([i64; 2], i64, usize)> {
+    let (p, n) = points[i];
+    let (mut rho, mut contact) = ((1i64 << 27) - 1, None);
+    for (j, (q, _)) in points.iter().enumerate() {
+        let (du, dv) = (q[0] - p[0], q[1] - p[1]);
+        let height = (-du * n[0] - dv * n[1]).div_euclid(1 << 14);
+        let squared = du * du + dv * dv;
+        let is_ahead = height > 0 && 4 * height * height >= squared;
+        if is_ahead && height < 2 * rho && squared < 2 * rho * height {
+            (rho, contact) = (squared / (2 * height), Some(j));
+        }
+    }
+    let contact = contact.filter(|_| rho > 0)?;
+    let centre = [0, 1].map(|k| p[k] + (-rho * n[k] + (1 << 13)).div_euclid(1 << 14));
+    let least = (rho - slack).max(0);
+    let is_deep = |q: &[i64; 2]| (q[0] - centre[0]).pow(2) + (q[1] - centre[1]).pow(2) < least * least;
+    (!points.iter().any(|(q, _)| is_deep(q))).then_some((centre, rho, contact))
+}
+
 /// An edge of a row: where, and whether the object lies to its left.
 pub type Edge = (i32, bool);
 

@@ -8,13 +8,14 @@ use std::time::{Duration, Instant};
 use image::GrayImage;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::super::model::{self, Model, Order, warnings};
+use super::super::model::{self, Model, Order, Place, warnings};
 use super::super::options::NoCalibration;
 use super::super::table::{count, sides};
+use super::super::timings::Timings;
 use super::super::{Failure, say, say_json, words_of};
 use super::Args;
 use crate::calibration::StereoCamera;
-use crate::reconstruct::{Options, Refusal, reconstruct};
+use crate::reconstruct::{Options, Refusal, Workspace};
 use crate::source::recording::Recording;
 use crate::source::scene::Scene;
 use crate::source::v4l::device::{Device, now};
@@ -37,6 +38,9 @@ pub(super) struct Session<'a> {
     options: &'a Options,
     calibration: Option<StereoCamera>,
     scene: Scene,
+    workspace: Workspace,
+    /// If they are wanted.
+    timings: Option<Timings>,
     recording: Option<Recording>,
     /// Pairs still to be thrown away.
     skip: u64,
@@ -92,6 +96,8 @@ impl<'a> Session<'a> {
             options,
             calibration: rig.calibration,
             scene,
+            workspace: Workspace::default(),
+            timings: args.timings.then(Timings::begin),
             recording,
             skip: args.skip,
             begun: Instant::now(),
@@ -111,6 +117,9 @@ impl<'a> Session<'a> {
             self.failure.get_or_insert(failure);
             None
         });
+        if let Some(timings) = &self.timings {
+            timings.tell();
+        }
         let failure = result.err().map(Failure::from).or(self.failure.take()).or_else(|| self.nothing());
         if self.args.json {
             say_json(&self.as_json(&tally, best.as_ref(), failure.as_ref()))?;
@@ -158,7 +167,7 @@ impl<'a> Session<'a> {
         } else {
             let folder = self.args.out.join(&name);
             self.make(views.images, &folder)
-                .map(|model| Success { size: sides(model.size()), warnings: model.warnings() })
+                .map(|model| Success { size: sides(model.size), warnings: model.warnings })
         };
         let result = match result {
             Ok(mut success) => {
@@ -179,23 +188,27 @@ impl<'a> Session<'a> {
     }
 
     /// The model of a pair, in its folder.
-    fn make(&self, views: [GrayImage; 2], folder: &Path) -> Result<Model, Failure> {
+    fn make(&mut self, views: [GrayImage; 2], folder: &Path) -> Result<Model, Failure> {
         let (images, calibration) = self.seen(views)?;
-        model::make(Order {
+        let order = Order {
             images,
             calibration: &calibration,
             options: self.options,
             pictures: !self.args.no_pictures,
-            page: None,
             truth: None,
-            folder,
-        })
+            place: Place { folder, report: self.args.json && self.args.best, page: self.args.report },
+        };
+        let model = model::make(order, &mut self.workspace)?;
+        if let Some(timings) = &mut self.timings {
+            timings.add(None, &model);
+        }
+        Ok(model)
     }
 
     /// Keeps a pair if it is the best so far; the first of equals stays. So many of its frames were damaged.
     fn weigh(&mut self, views: [GrayImage; 2], damaged: usize) -> Result<Success, Failure> {
-        let ([left, right], calibration) = self.seen(views.clone())?;
-        let made = reconstruct(left, right, &calibration, self.options, &mut ())?;
+        let (seen, calibration) = self.seen(views.clone())?;
+        let made = self.workspace.reconstruct(seen.each_ref(), &calibration, self.options, &mut ())?;
         let warnings = warnings(&made);
         let rows = made.outcome.rows;
         let worth = (damaged + warnings.len(), f64::from(rows.unmatched) / f64::from(rows.crossings.max(1)));
@@ -203,6 +216,7 @@ impl<'a> Session<'a> {
             self.best = Some(Best { index: self.done.len(), views, worth });
         }
         let size = made.mesh.bounds().map_or_else(nalgebra::Vector3::zeros, |[low, high]| high - low);
+        self.workspace.recycle(made);
         Ok(Success { size: sides(size), warnings })
     }
 

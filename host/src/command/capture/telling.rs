@@ -81,7 +81,7 @@ impl Session<'_> {
         if let Some((name, model)) = best {
             table.row("best", name);
             model.tell(&mut table);
-            model.warnings().iter().for_each(|warning| table.row("warning", warning));
+            model.warnings.iter().for_each(|warning| table.row("warning", warning));
         }
         if good > 0 && !self.args.only_record {
             table.row("files", &self.args.out.display().to_string());

@@ -4,16 +4,20 @@
 
 use super::{Args, Made, Stage};
 use crate::report::record::{DistanceImage, mask_image};
+use crate::wide;
 use image::GrayImage;
 use shared::arena::{Arena, words};
-use shared::bitmap::{Bitmap, Grey, Plane, Size, Word};
+use shared::bitmap::{Grey, Plane, Size, Word};
 use shared::limits::{CapacityError, MAX_SIDE};
+use shared::pack::unpack;
 use shared::point::PixelPoint;
 use shared::stage::binarise::{self, Tone};
 use shared::stage::boundary::{Element, boundary};
 use shared::stage::distance::{self, Parabola, distance};
 use shared::stage::hull::{bitmap_extents, convex_hull};
-use shared::stage::thinning::{self, Rule, thin};
+use shared::stage::parallel_thinning::Report;
+use shared::stage::sequential_thinning::scratch_order;
+use shared::stage::thinning::{Rule, thin};
 use std::time::Instant;
 
 /// Vertices of a hull: two a row and two more.
@@ -29,7 +33,7 @@ struct Memory {
     scratch: Vec<u64>,
     hull: Box<heapless::Vec<PixelPoint, VERTICES>>,
     bytes: Vec<u8>,
-    thinned: thinning::Report,
+    thinned: Report,
 }
 
 impl Memory {
@@ -40,10 +44,10 @@ impl Memory {
             more_words: vec![0; size.words()],
             plane: vec![0; size.pixels()],
             parabolas: vec![Parabola::default(); distance::scratch_parabolas(size.width)],
-            scratch: vec![0; words::<u32>(thinning::scratch_order(size.pixels(), u16::MAX))],
+            scratch: vec![0; words::<u32>(scratch_order(size.pixels(), u16::MAX))],
             hull: Box::default(),
             bytes: vec![0; size.pixels()],
-            thinned: thinning::Report::default(),
+            thinned: Report::default(),
         }
     }
 
@@ -57,20 +61,21 @@ impl Memory {
         let mut bitmap = binarise::binarise(grey, level, tone, &mut self.words)?;
         match stage {
             Stage::Boundary => {
-                unpack(&boundary(&bitmap, Element::Square, &mut self.more_words)?, &mut self.bytes);
+                unpack(&boundary(&bitmap, Element::Square, &mut self.more_words)?, &mut self.bytes)?;
             }
             Stage::Thinning => {
                 let plane = match rule {
                     Rule::EdtOrdered => distance(&bitmap, &mut self.plane, &mut self.parabolas)?,
                     _ => Plane::over(self.size, &mut self.plane)?,
                 };
-                self.thinned = thin(&mut bitmap, rule, &plane, Arena::new(&mut self.scratch))?;
-                unpack(&bitmap, &mut self.bytes);
+                self.thinned =
+                    thin(&mut bitmap, (rule, wide::kernels().thin), &plane, Arena::new(&mut self.scratch))?;
+                unpack(&bitmap, &mut self.bytes)?;
             }
             Stage::Distance => {
                 distance(&bitmap, &mut self.plane, &mut self.parabolas)?;
             }
-            Stage::Binarise => unpack(&bitmap, &mut self.bytes),
+            Stage::Binarise => unpack(&bitmap, &mut self.bytes)?,
             _ => convex_hull(bitmap_extents(&bitmap), &mut *self.hull)?,
         }
         Ok(())
@@ -79,14 +84,6 @@ impl Memory {
     fn mask(&self, bytes: &[u8]) -> GrayImage {
         let (width, height) = (self.size.width as u32, self.size.height as u32);
         GrayImage::from_raw(width, height, bytes.to_vec()).unwrap_or_default()
-    }
-}
-
-/// A bitmap to bytes of 0 and 255.
-fn unpack(bitmap: &Bitmap<'_>, bytes: &mut [u8]) {
-    bytes.fill(0);
-    for pixel in bitmap.pixels() {
-        bytes[usize::from(pixel.v) * bitmap.size().width + usize::from(pixel.u)] = u8::MAX;
     }
 }
 

@@ -5,6 +5,7 @@ use shared::arena::Arena;
 use shared::bitmap::{Bitmap, Size};
 use shared::stage::boundary::{Element, boundary};
 use shared::stage::distance::{self, distance};
+use shared::stage::parallel_thinning;
 use shared::stage::thinning::thin;
 
 #[derive(Parser)]
@@ -49,7 +50,8 @@ fn thinning_is_the_cores_for_every_rule() {
         let mut data = vec![0; size.pixels()];
         let mut parabolas = vec![distance::Parabola::default(); distance::scratch_parabolas(97)];
         let plane = distance(&bitmap, &mut data, &mut parabolas).unwrap();
-        thin(&mut bitmap, rule, &plane, Arena::new(&mut vec![7; 1 << 15])).unwrap();
+        thin(&mut bitmap, (rule, parallel_thinning::thin), &plane, Arena::new(&mut vec![7; 1 << 15]))
+            .unwrap();
         assert_eq!(pixels(&made.rasters.skeleton), set(&bitmap), "{name}");
         assert_eq!(made.times.len(), 2);
     }

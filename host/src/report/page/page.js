@@ -2,7 +2,7 @@
 const data = JSON.parse(document.getElementById("data").textContent);
 const byId = (id) => document.getElementById(id);
 const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-const config = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["toImage", "sendDataToCloud"] };
+const config = { responsive: true, displayModeBar: false };
 
 // Colours follow the page, also when that changes between day and night.
 function flat(title) {
@@ -16,7 +16,7 @@ function flat(title) {
 
 const surface = (s, name, more) => ({
   type: "mesh3d", name, x: s.x, y: s.y, z: s.z, i: s.i, j: s.j, k: s.k, hoverinfo: "x+y+z", flatshading: false,
-  lighting: { ambient: 0.45, diffuse: 0.7, specular: 0.15, roughness: 0.8 }, lightposition: { x: -1e4, y: -1e5, z: -1e5 },
+  lighting: { ambient: 0.5, diffuse: 0.6, specular: 0.15, roughness: 0.8 }, lightposition: { x: 1e4, y: 1e5, z: 1e5 },
   ...more,
 });
 const lines = (l, name, colour, width) => ({
@@ -61,13 +61,27 @@ for (const [name, , on] of traces) {
   byId("traces").append(label);
 }
 
-for (const box of document.querySelectorAll("[data-layer]")) {
-  box.addEventListener("change", () => {
-    for (const layer of document.getElementsByClassName("layer " + box.dataset.layer)) {
-      layer.style.display = box.checked ? "" : "none";
-    }
-  });
+function showLayer(box) {
+  for (const layer of document.getElementsByClassName("layer " + box.dataset.layer)) {
+    layer.style.display = box.checked ? "" : "none";
+  }
 }
+
+const layers = document.querySelectorAll("[data-layer]");
+for (const box of layers) box.addEventListener("change", () => showLayer(box));
+
+// An address can say what is shown: report.html#show=model,skeleton,hull
+function obeyAddress() {
+  const show = new URLSearchParams(location.hash.slice(1)).get("show");
+  if (show === null) return;
+  const names = show.split(",");
+  for (const [name] of traces) byId("trace-" + name).checked = names.includes(name);
+  for (const box of layers) {
+    box.checked = names.includes(box.dataset.layer);
+    showLayer(box);
+  }
+}
+addEventListener("hashchange", () => { obeyAddress(); drawSpace(); });
 
 function drawHistogram() {
   const layout = flat("grey value");
@@ -150,6 +164,7 @@ function drawAll() {
   if (data.shifts) drawShifts();
 }
 
+obeyAddress();
 summarise();
 tellTimes();
 tell(data.report, byId("numbers"));

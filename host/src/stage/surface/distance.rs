@@ -16,17 +16,17 @@ const CONTAINED: f64 = 1.0 - 1e-8;
 /// A round cone made ready for many distance queries.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Distance {
-    start: Point3<f64>,
+    pub(super) start: Point3<f64>,
     /// Unit vector towards the other end; zero for one ball.
-    axis: Vector3<f64>,
+    pub(super) axis: Vector3<f64>,
     /// Between the centres, mm; zero for one ball.
-    length: f64,
+    pub(super) length: f64,
     /// At the start, mm.
-    radius: f64,
+    pub(super) radius: f64,
     /// Growth of the radius along the axis, within (-1, 1).
-    slope: f64,
+    pub(super) slope: f64,
     /// Tangent of the side's angle to the axis.
-    lean: f64,
+    pub(super) lean: f64,
 }
 
 impl Distance {
@@ -58,6 +58,38 @@ impl Distance {
         (p - (self.start + self.axis * s)).try_normalize(blur)
     }
 
+    /// Where the ray from `from` by `step` leaves the cone, as a share of the step; none if it does not meet
+    /// it.
+    ///
+    /// Of the balls between the ends the one that the ray leaves last decides: where the side's quadric is
+    /// left at a ball between the ends, that is the place, and otherwise it is at one of the ends.
+    pub(super) fn exit(&self, from: &Point3<f64>, step: &Vector3<f64>) -> Option<f64> {
+        let from_start = from - self.start;
+        let square = step.norm_squared();
+        let of_ball = |s: f64| {
+            let from_centre = from_start - self.axis * s;
+            let radius = self.radius + self.slope * s;
+            exit_of(square, from_centre.dot(step), from_centre.norm_squared() - radius * radius)
+        };
+        if self.length == 0.0 {
+            return of_ball(0.0);
+        }
+        let (along, ahead) = (from_start.dot(&self.axis), step.dot(&self.axis));
+        let tangent = 1.0 / (1.0 - self.slope * self.slope);
+        // A point is deepest, by squares, in the ball at `deepest`, which moves by `moved` a step.
+        let base = along + self.slope * self.radius;
+        let (deepest, moved) = (base * tangent, ahead * tangent);
+        let side = exit_of(
+            square - ahead * moved,
+            from_start.dot(step) - base * moved,
+            from_start.norm_squared() - self.radius * self.radius - base * deepest,
+        );
+        if let Some(share) = side.filter(|share| (0.0..=self.length).contains(&(deepest + moved * share))) {
+            return Some(share);
+        }
+        [of_ball(0.0), of_ball(self.length)].into_iter().flatten().reduce(f64::max)
+    }
+
     /// Where `p` is along the axis and away from it, and the ball that decides its distance, all in mm.
     fn nearest_ball(&self, p: &Point3<f64>) -> (f64, f64, f64) {
         let from_start = p - self.start;
@@ -65,6 +97,13 @@ impl Distance {
         let away = (from_start - self.axis * along).norm();
         (along, away, (along + self.lean * away).clamp(0.0, self.length))
     }
+}
+
+/// The zero of a t^2 + 2 b t + c at which it grows.
+fn exit_of(a: f64, b: f64, c: f64) -> Option<f64> {
+    let root = (b * b - a * c).sqrt();
+    let zero = if b > 0.0 { -c / (b + root) } else { (root - b) / a };
+    zero.is_finite().then_some(zero)
 }
 
 #[cfg(test)]
@@ -89,6 +128,30 @@ mod tests {
             let got = tapered.at(&Point3::new(x, 0.0, y));
             assert!((got - least).abs() < 1e-8, "({x}, {y}): {got} {least}");
         }
+    }
+
+    #[test]
+    fn a_ray_leaves_where_the_distance_is_zero_and_grows() {
+        let at = |i: i32, n: i32| f64::from(i * n % 17) - 8.0;
+        let mut left = 0;
+        for (radii, i) in [[2.0, 5.0], [5.0, 2.0], [3.0, 3.0], [9.0, 1.0], [0.5, 10.4]]
+            .iter()
+            .flat_map(|r| (0..40).map(move |i| (*r, i)))
+        {
+            let cone = cone(10.0, radii);
+            let from = Point3::new(f64::from(i % 11), 0.3 * at(i, 5), 0.3 * at(i, 7));
+            let step = Vector3::new(at(i, 3), at(i, 11), at(i, 13) + 0.5);
+            if cone.at(&from) >= 0.0 {
+                continue;
+            }
+            let share = cone.exit(&from, &step).unwrap();
+            let beyond = from + step * (share + 1e-3);
+            assert!(cone.at(&(from + step * share)).abs() < 1e-7, "{radii:?} {i}");
+            assert!(share > 0.0 && cone.at(&beyond) > 0.0, "{radii:?} {i}");
+            left += 1;
+        }
+        assert!(left > 100, "{left}");
+        assert_eq!(cone(10.0, [1.0, 2.0]).exit(&Point3::new(0.0, 9.0, 0.0), &Vector3::x()), None);
     }
 
     #[test]

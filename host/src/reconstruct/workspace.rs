@@ -1,0 +1,222 @@
+//! The memory of reconstructions, one after the other, and the chain of their stages in it.
+
+use super::grow::Described;
+use super::options::{core_settings, settings};
+use super::{Clock, Growth, Mode, Options, Reconstruction, Refusal, grey, optics};
+use crate::calibration::StereoCamera;
+use crate::memory::Storage;
+use crate::mesh::Mesh;
+use crate::mesh::body::Bodies;
+use crate::stage::rectify::{PixelBox, Rectification, RectifiedCamera, RectifyError};
+use crate::stage::surface::{Mesher, RoundCone};
+use image::GrayImage;
+use nalgebra::{Point2, Point3, Vector3};
+use shared::camera::PairModel;
+use shared::fixed::PX;
+use shared::pipeline::{self, Finding, Memory, Observer, Outcome, Settings, Side};
+use shared::stage::depth::Optics;
+use std::mem::take;
+
+/// Cells along the diagonal of a mesh at most, unless the user says otherwise.
+const MAX_CELLS: f64 = 300.0;
+
+/// What a reconstruction needs in passing. It grows with the first pairs; the core's stages and the host's then
+/// allocate nothing for a pair as large as those, if what was made of the last one is given back ([`Self::recycle`]).
+#[derive(Default)]
+pub struct Workspace {
+    storage: Storage,
+    /// The rectified pair, if it is not the raw one.
+    images: [GrayImage; 2],
+    growth: Growth,
+    mesher: Mesher,
+    bodies: Bodies,
+    mesh: Mesh,
+    clock: Clock,
+}
+
+/// A solid that has no surface yet: its round cones are [`Workspace::cones`].
+#[derive(Debug)]
+pub struct Solid {
+    /// What the core says.
+    pub outcome: Outcome,
+    /// The rectified cameras, in whose axes it is.
+    pub camera: RectifiedCamera,
+    /// Whether the images had to be resampled.
+    pub resampled: bool,
+}
+
+impl Workspace {
+    /// As [`reconstruct`](super::reconstruct); the images stay the caller's.
+    ///
+    /// # Errors
+    /// A [`Refusal`] that says what is wrong and what to do.
+    pub fn reconstruct(
+        &mut self,
+        views: [&GrayImage; 2],
+        calibration: &StereoCamera,
+        options: &Options,
+        observer: &mut impl Observer,
+    ) -> Result<Reconstruction, Refusal> {
+        let solid = self.solid(views, calibration, options, observer)?;
+        self.finish(solid, options)
+    }
+
+    /// As [`reconstruct_shape`](super::reconstruct_shape).
+    ///
+    /// # Errors
+    /// As [`Self::reconstruct`].
+    pub fn reconstruct_shape(
+        &mut self,
+        (memory, outcome): (&mut Memory<'_>, Outcome),
+        model: &PairModel,
+        options: &Options,
+        observer: &mut impl Observer,
+    ) -> Result<Reconstruction, Refusal> {
+        self.clock.start();
+        model.check().map_err(RectifyError::from)?;
+        pipeline::resume(memory, &outcome, optics(model), observer).map_err(Finding::from)?;
+        self.clock.lap("core");
+        let solid = Solid { outcome, camera: model.into(), resampled: model.eyes.is_some() };
+        grow(&mut self.growth, memory, &solid, options, &mut self.clock)?;
+        self.finish(solid, options)
+    }
+
+    /// The solid of a pair, without its surface.
+    ///
+    /// # Errors
+    /// As [`Self::reconstruct`].
+    pub fn solid(
+        &mut self,
+        views: [&GrayImage; 2],
+        calibration: &StereoCamera,
+        options: &Options,
+        observer: &mut impl Observer,
+    ) -> Result<Solid, Refusal> {
+        self.clock.start();
+        calibration.left.check_size(views[0].width(), views[0].height())?;
+        calibration.right.check_size(views[1].width(), views[1].height())?;
+        let rectification = rectification(views, calibration, options, &mut self.storage)?;
+        let (camera, resampled) = (rectification.camera(), !rectification.is_identity());
+        let images = rectification.images_into(views, &mut self.images)?;
+        self.clock.lap("rectify");
+
+        let (width, height) = images[0].dimensions();
+        self.storage.fit(width as usize, height as usize).map_err(Finding::from)?;
+        let mut memory = self.storage.lend();
+        let [left, right] = images.map(grey);
+        let outcome = pipeline::run(&mut memory, left?, right?, &settings(&camera, options), observer)?;
+        self.clock.lap("core");
+        let solid = Solid { outcome, camera, resampled };
+        grow(&mut self.growth, &memory, &solid, options, &mut self.clock)?;
+        Ok(solid)
+    }
+
+    /// The union of these is the last solid; rectified axes, mm.
+    #[must_use]
+    pub fn cones(&self) -> &[RoundCone] {
+        &self.growth.cones
+    }
+
+    /// Give back the lists of what was made and is done with, for the next pair.
+    pub fn recycle(&mut self, made: Reconstruction) {
+        self.mesh = made.mesh;
+        self.growth.skeleton = made.skeleton;
+        self.growth.boundary = made.boundary;
+        self.clock.laps = made.times;
+    }
+
+    /// From the solid to its surface, and everything to the left camera's axes.
+    fn finish(&mut self, solid: Solid, options: &Options) -> Result<Reconstruction, Refusal> {
+        let Solid { outcome, camera, resampled } = solid;
+        let cones = &self.growth.cones;
+        let cell = options.cell.unwrap_or_else(|| default_cell(&camera, cones));
+        self.mesher.surface(cones, cell, &mut self.mesh)?;
+        let dropped = self.bodies.keep_largest(&mut self.mesh);
+        self.clock.lap("surface");
+        let turned = |points: &mut [Point3<f64>]| {
+            points.iter_mut().for_each(|point| *point = camera.to_left_camera(*point));
+        };
+        turned(&mut self.growth.skeleton.points);
+        turned(&mut self.growth.boundary.points);
+        turned(&mut self.mesh.vertices);
+        Ok(Reconstruction {
+            mesh: take(&mut self.mesh),
+            skeleton: take(&mut self.growth.skeleton),
+            boundary: take(&mut self.growth.boundary),
+            outcome,
+            camera,
+            resampled,
+            cell,
+            cones: self.growth.cones.len(),
+            dropped: (dropped.bodies, dropped.volume),
+            times: take(&mut self.clock.laps),
+        })
+    }
+}
+
+/// From what the core leaves in its memory to the solid.
+fn grow(
+    growth: &mut Growth,
+    memory: &Memory<'_>,
+    solid: &Solid,
+    options: &Options,
+    clock: &mut Clock,
+) -> Result<(), Refusal> {
+    let Solid { outcome, camera, .. } = solid;
+    match options.mode {
+        Mode::Default => growth.grow(camera, &Described::of(memory, outcome), options, clock),
+        Mode::Paper { .. } => growth.grow_as_paper(camera, memory),
+    }
+    clock.lap("grow");
+    if growth.cones.is_empty() {
+        let erased = |f: &Finding| matches!(f, Finding::SkeletonErased(_));
+        return Err(outcome.findings.iter().find(|f| erased(f)).map_or(Refusal::Behind, |f| (*f).into()));
+    }
+    Ok(())
+}
+
+/// How to rectify: around the object, whose box in both raw images must be known for that.
+fn rectification(
+    [left, right]: [&GrayImage; 2],
+    calibration: &StereoCamera,
+    options: &Options,
+    storage: &mut Storage,
+) -> Result<Rectification, Refusal> {
+    if let Some(untouched) = Rectification::untouched(calibration) {
+        return Ok(untouched);
+    }
+    // What a camera is set to does not matter where the object lies.
+    let settings = core_settings(Optics { focal: PX, disparity_offset: 0 }, options);
+    let boxes = [
+        object_box(left, Side::Left, &settings, storage)?,
+        object_box(right, Side::Right, &settings, storage)?,
+    ];
+    Ok(Rectification::around(calibration, boxes)?)
+}
+
+/// The box of the object in a raw image.
+fn object_box(
+    image: &GrayImage,
+    side: Side,
+    settings: &Settings,
+    storage: &mut Storage,
+) -> Result<PixelBox, Finding> {
+    let grey = grey(image)?;
+    storage.fit(grey.size().width, grey.size().height)?;
+    let Memory { eyes: [eye, _], scratch, kernels, .. } = storage.lend();
+    let found = pipeline::object_box(side, grey, (eye.mask, scratch), (settings, &kernels))?;
+    let corner = |p: shared::point::Pixel| Point2::new(f64::from(p.u), f64::from(p.v));
+    Ok(PixelBox { min: corner(found.min), max: corner(found.max) })
+}
+
+/// The mesh's grid spacing by default, mm: two pixels at the nearest ball, but no more than
+/// [`MAX_CELLS`] along the diagonal, which only a model that is wrong would have.
+fn default_cell(camera: &RectifiedCamera, cones: &[RoundCone]) -> f64 {
+    let balls = || cones.iter().flat_map(|c| c.centres.into_iter().zip(c.radii));
+    let depth = balls().map(|(c, _)| c.z).fold(f64::INFINITY, f64::min);
+    let low =
+        balls().fold(Point3::from([f64::INFINITY; 3]), |low, (c, r)| low.inf(&(c - Vector3::repeat(r))));
+    let high =
+        balls().fold(Point3::from([-f64::INFINITY; 3]), |high, (c, r)| high.sup(&(c + Vector3::repeat(r))));
+    (2.0 * depth / camera.f).max((high - low).norm() / MAX_CELLS)
+}

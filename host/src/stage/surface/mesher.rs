@@ -1,0 +1,235 @@
+//! The steps of [`surface`](super::surface) in their order, and the memory that they share.
+
+use std::{
+    collections::HashMap,
+    hash::{BuildHasherDefault, Hasher},
+    ops::Range,
+    sync::atomic::AtomicUsize,
+};
+
+use nalgebra::Point3;
+use rayon::prelude::*;
+
+use super::{
+    CUBE, RoundCone, SurfaceError,
+    block::{EDGE, Grove, MAX_BLOCKS},
+    distance::Distance,
+    lattice::{Lattice, SIDE},
+    patch::{Blocks, Cut},
+    prune::{Answer, prune},
+    region::{Level, Octant, Region, Solid},
+};
+use crate::mesh::Mesh;
+
+/// The solid is divided until there are so many regions, which are then worked on side by side.
+const GROVES: usize = 64;
+
+/// What [`surface`](super::surface) needs on the way, kept from one solid to the next: once it has grown to
+/// their size, nothing more is allocated.
+#[derive(Debug, Default)]
+pub struct Mesher {
+    distances: Vec<Distance>,
+    /// The regions of the groves, and room for their children.
+    seeds: [Seeds; 2],
+    level: Level,
+    answers: Vec<Answer>,
+    groves: Vec<Grove>,
+    /// Of the blocks of each grove.
+    cuts: Vec<Vec<Cut>>,
+    places: HashMap<[i32; 3], Place, BuildHasherDefault<Mixer>>,
+}
+
+/// Regions with their cones.
+#[derive(Debug, Default)]
+struct Seeds {
+    regions: Vec<(Region, Range<usize>)>,
+    cones: Vec<u32>,
+}
+
+/// Where a block is: its grove, and its place there.
+type Place = (u32, u32);
+
+impl Mesher {
+    /// As [`surface`](super::surface), into `mesh`, which is emptied first.
+    ///
+    /// # Errors
+    ///
+    /// See [`SurfaceError`].
+    pub fn surface(&mut self, cones: &[RoundCone], cell: f64, mesh: &mut Mesh) -> Result<(), SurfaceError> {
+        mesh.vertices.clear();
+        mesh.faces.clear();
+        super::check(cones, cell)?;
+        let lattice = Lattice::around(cones, cell * CUBE);
+        let too_fine = SurfaceError::TooFine { cell, size: lattice.size };
+        let along = lattice.blocks_along().ok_or(too_fine)?;
+        self.distances.clear();
+        self.distances.extend(cones.iter().map(Distance::to));
+        let solid = Solid { lattice: &lattice, distances: &self.distances };
+
+        let [seeds, next] = &mut self.seeds;
+        seeds.begin(Region { corner: [0; 3], cubes: along * SIDE }, cones.len());
+        while seeds.regions.len() < GROVES && seeds.regions.first().is_some_and(|seed| seed.0.cubes > SIDE) {
+            seeds.divide(&solid, next, &mut self.level, &mut self.answers);
+            std::mem::swap(seeds, next);
+        }
+
+        let count = seeds.regions.len();
+        if self.groves.len() < count {
+            self.groves.resize_with(count, Grove::default);
+            self.cuts.resize_with(count, Vec::new);
+        }
+        let (groves, cuts) = (&mut self.groves[..count], &mut self.cuts[..count]);
+        let found = AtomicUsize::new(0);
+        groves.par_iter_mut().zip(&seeds.regions).for_each(|(grove, (region, own))| {
+            grove.grow(&solid, *region, &seeds.cones[own.clone()], &found);
+        });
+        if found.into_inner() > MAX_BLOCKS {
+            return Err(too_fine);
+        }
+
+        self.places.clear();
+        for (number, grove) in groves.iter().enumerate() {
+            let places = grove.blocks.iter().enumerate();
+            self.places.extend(places.map(|(place, block)| (block.corner, (number as u32, place as u32))));
+        }
+        let wood = Wood { groves, places: &self.places };
+        cuts.par_iter_mut().enumerate().for_each(|(grove, cuts)| {
+            cuts.clear();
+            cuts.extend(
+                (0..wood.groves[grove].blocks.len())
+                    .map(|place| Cut::of(&wood.blocks(&wood.ahead(grove, place)))),
+            );
+        });
+        let faces = number(cuts);
+        if faces == 0 {
+            return Err(SurfaceError::TooCoarse { cell });
+        }
+        wood.put(&solid, cuts, mesh);
+        Ok(())
+    }
+}
+
+impl Seeds {
+    /// One region with all cones.
+    fn begin(&mut self, region: Region, cones: usize) {
+        self.regions.clear();
+        self.cones.clear();
+        self.regions.push((region, 0..cones));
+        self.cones.extend(0..cones as u32);
+    }
+
+    /// Puts the children of all regions near which the surface can pass into `next`.
+    fn divide(&self, solid: &Solid, next: &mut Self, level: &mut Level, answers: &mut Vec<Answer>) {
+        next.regions.clear();
+        next.cones.clear();
+        for (region, own) in &self.regions {
+            level.cones.clear();
+            level.cones.extend(&self.cones[own.clone()]);
+            let bundle = level.bundle(solid, *region);
+            for octant in Octant::all(*region) {
+                let start = next.cones.len();
+                prune(&bundle, octant.around, EDGE, answers, &mut next.cones);
+                if next.cones.len() > start {
+                    next.regions.push((octant.region, start..next.cones.len()));
+                }
+            }
+        }
+    }
+}
+
+/// Numbers the vertices of all blocks, and returns how many faces there are.
+fn number(cuts: &mut [Vec<Cut>]) -> u32 {
+    let (mut vertices, mut faces) = (0, 0);
+    for cut in cuts.iter_mut().flatten() {
+        cut.first_vertex = vertices;
+        vertices += cut.vertices;
+        faces += cut.faces;
+    }
+    faces
+}
+
+/// All blocks.
+#[derive(Clone, Copy)]
+struct Wood<'a> {
+    groves: &'a [Grove],
+    places: &'a HashMap<[i32; 3], Place, BuildHasherDefault<Mixer>>,
+}
+
+impl<'a> Wood<'a> {
+    /// A block and those ahead of it, see [`Blocks`].
+    fn ahead(&self, grove: usize, place: usize) -> [Option<Place>; 8] {
+        let corner = self.groves[grove].blocks[place].corner;
+        std::array::from_fn(|ahead| {
+            let step = |axis: usize| (ahead >> (2 - axis) & 1) as i32 * 2 * SIDE;
+            self.places.get(&[corner[0] + step(0), corner[1] + step(1), corner[2] + step(2)]).copied()
+        })
+    }
+
+    fn blocks(&self, places: &[Option<Place>; 8]) -> Blocks<'a> {
+        places.map(|place| {
+            let grove = &self.groves[place?.0 as usize];
+            Some((grove, &grove.blocks[place?.1 as usize]))
+        })
+    }
+
+    /// Fills `mesh` with what has been cut.
+    fn put(&self, solid: &Solid, cuts: &[Vec<Cut>], mesh: &mut Mesh) {
+        let count = |of: fn(&Cut) -> u32| cuts.iter().flatten().map(|cut| of(cut) as usize).sum();
+        mesh.vertices.resize(count(|cut| cut.vertices), Point3::origin());
+        spread(0, cuts, &mut mesh.vertices, |cut| cut.vertices, &|grove, mut vertices| {
+            for (place, cut) in cuts[grove].iter().enumerate() {
+                let (own, others) = vertices.split_at_mut(cut.vertices as usize);
+                cut.put_vertices(solid, &self.blocks(&self.ahead(grove, place)), own);
+                vertices = others;
+            }
+        });
+        mesh.faces.resize(count(|cut| cut.faces), [0; 3]);
+        let vertices = &mesh.vertices;
+        spread(0, cuts, &mut mesh.faces, |cut| cut.faces, &|grove, mut faces| {
+            for (place, cut) in cuts[grove].iter().enumerate() {
+                let (own, others) = faces.split_at_mut(cut.faces as usize);
+                let places = self.ahead(grove, place);
+                let cuts = places.map(|place| Some(&cuts[place?.0 as usize][place?.1 as usize]));
+                Cut::put_faces(&self.blocks(&places), &cuts, vertices, own);
+                faces = others;
+            }
+        });
+    }
+}
+
+/// Hands to `put`, side by side, the number of each grove and its share of `out`.
+fn spread<T: Send>(
+    first: usize,
+    cuts: &[Vec<Cut>],
+    out: &mut [T],
+    count: fn(&Cut) -> u32,
+    put: &(impl Fn(usize, &mut [T]) + Sync),
+) {
+    if let [_] = cuts {
+        return put(first, out);
+    }
+    let (left, right) = cuts.split_at(cuts.len() / 2);
+    let (here, there) = out.split_at_mut(left.iter().flatten().map(|cut| count(cut) as usize).sum());
+    rayon::join(
+        || spread(first, left, here, count, put),
+        || spread(first + left.len(), right, there, count, put),
+    );
+}
+
+/// Mixes the bits of a block's corner: std's hasher is proof against an enemy, which costs.
+#[derive(Debug, Default)]
+struct Mixer(u64);
+
+impl Hasher for Mixer {
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|&byte| self.write_i32(i32::from(byte)));
+    }
+
+    fn write_i32(&mut self, x: i32) {
+        self.0 = (self.0.rotate_left(26) ^ u64::from(x.cast_unsigned())).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    }
+
+    fn finish(&self) -> u64 {
+        self.0.rotate_left(26)
+    }
+}

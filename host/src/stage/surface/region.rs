@@ -1,0 +1,83 @@
+//! Regions of the lattice, which are divided in eight until they are blocks, and the blocks in leaves.
+
+use nalgebra::Point3;
+
+use super::{
+    bundle::{Bundle, Group, prepare},
+    distance::Distance,
+    lattice::Lattice,
+    prune::Around,
+};
+
+/// What all regions have in common.
+#[derive(Clone, Copy)]
+pub(super) struct Solid<'a> {
+    pub(super) lattice: &'a Lattice,
+    pub(super) distances: &'a [Distance],
+}
+
+/// A region of the lattice that is to be divided.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Region {
+    /// Its lowest corner, in half cubes.
+    pub(super) corner: [i32; 3],
+    /// Lattice cubes along its side.
+    pub(super) cubes: i32,
+}
+
+impl Region {
+    pub(super) fn octant(&self, octant: usize) -> Self {
+        let half = self.cubes / 2;
+        let bit = |axis: usize| (octant >> (2 - axis) & 1) as i32;
+        Self { corner: [0, 1, 2].map(|axis| self.corner[axis] + bit(axis) * half * 2), cubes: half }
+    }
+}
+
+/// How far the corners of a region of `cubes` a side are from its middle, in cubes.
+fn reach(cubes: i32) -> f32 {
+    cubes as f32 * 0.866_025_5
+}
+
+/// A region on the way down.
+#[derive(Debug, Default)]
+pub(super) struct Level {
+    pub(super) cones: Vec<u32>,
+    groups: Vec<Group>,
+}
+
+impl Solid<'_> {
+    pub(super) fn middle(&self, region: Region) -> Point3<f64> {
+        self.lattice.middle(region.corner, region.cubes)
+    }
+}
+
+impl Level {
+    /// The level's cones, around the middle of `region`, of which it has them.
+    pub(super) fn bundle(&mut self, solid: &Solid, region: Region) -> Bundle<'_> {
+        let middle = solid.middle(region);
+        self.groups.clear();
+        prepare(&self.cones, solid.distances, &middle, solid.lattice.cube, &mut self.groups);
+        Bundle { cones: &self.cones, groups: &self.groups, middle }
+    }
+}
+
+/// One of the eight children of a region.
+pub(super) struct Octant {
+    pub(super) region: Region,
+    /// As seen from the middle of the parent.
+    pub(super) around: Around,
+}
+
+impl Octant {
+    /// The eight children.
+    pub(super) fn all(parent: Region) -> impl Iterator<Item = Self> {
+        (0..8).map(move |octant| Self::of(parent, octant))
+    }
+
+    pub(super) fn of(parent: Region, octant: usize) -> Self {
+        let region = parent.octant(octant);
+        let quarter = parent.cubes as f32 / 4.0;
+        let offset = [0, 1, 2].map(|axis| if octant >> (2 - axis) & 1 == 1 { quarter } else { -quarter });
+        Self { region, around: Around { offset, reach: reach(region.cubes) } }
+    }
+}

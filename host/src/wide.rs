@@ -1,0 +1,165 @@
+//! The core's inner loops in the widest registers that this machine has.
+//!
+//! What a register holds is told by [`Lanes`]; the loops are the core's own, compiled once more for each
+//! width. The only place of the host that is `unsafe`: registers may be used only where the machine has
+//! them, which is asked for once.
+
+#![expect(unsafe_code, reason = "the compiler cannot know which registers the machine has")]
+
+use shared::pipeline::Kernels;
+use shared::stage::parallel_thinning::Thin;
+
+/// What this machine does best.
+pub fn kernels() -> Kernels {
+    let thin = widths().into_iter().rev().find_map(|(_, thin)| thin);
+    Kernels { thin: thin.unwrap_or(Kernels::PORTABLE.thin), ..Kernels::PORTABLE }
+}
+
+/// Thinning in registers wider than a word, the narrowest first, where this machine has them.
+#[cfg(target_arch = "x86_64")]
+pub fn widths() -> [(&'static str, Option<Thin>); 2] {
+    let avx512 = is_x86_feature_detected!("avx512f")
+        && is_x86_feature_detected!("avx512bw")
+        && is_x86_feature_detected!("avx512vl")
+        && is_x86_feature_detected!("avx512dq");
+    let avx2 = is_x86_feature_detected!("avx2");
+    [("AVX2", avx2.then_some(x86::avx2 as Thin)), ("AVX-512", avx512.then_some(x86::avx512 as Thin))]
+}
+
+/// Thinning in registers wider than a word: there is none for this kind of machine.
+#[cfg(not(target_arch = "x86_64"))]
+pub fn widths() -> [(&'static str, Option<Thin>); 0] {
+    []
+}
+
+#[cfg(target_arch = "x86_64")]
+mod x86 {
+    use core::arch::x86_64::*;
+    use core::ops::{BitAnd, BitOr, BitXor, Not, Shl, Shr};
+    use shared::arena::Arena;
+    use shared::bitmap::{Bitmap, Word};
+    use shared::lanes::Lanes;
+    use shared::limits::CapacityError;
+    use shared::stage::parallel_thinning::{Parallel, Report, thin_in_lanes};
+
+    /// A register as lanes: its type, words, features, instructions, and the thinning in it.
+    macro_rules! lanes {
+        ($name:ident $register:ty, $words:literal, $features:literal, $thin:ident, $splat:ident, $load:ident,
+         $store:ident, $and:ident, $or:ident, $xor:ident, $shl:ident, $shr:ident) => {
+            #[derive(Clone, Copy)]
+            struct $name($register);
+
+            impl BitAnd for $name {
+                type Output = Self;
+
+                #[inline(always)]
+                fn bitand(self, other: Self) -> Self {
+                    // SAFETY: lanes are used below `$thin` only, which runs only where there are such registers.
+                    Self(unsafe { $and(self.0, other.0) })
+                }
+            }
+
+            impl BitOr for $name {
+                type Output = Self;
+
+                #[inline(always)]
+                fn bitor(self, other: Self) -> Self {
+                    // SAFETY: as above.
+                    Self(unsafe { $or(self.0, other.0) })
+                }
+            }
+
+            impl BitXor for $name {
+                type Output = Self;
+
+                #[inline(always)]
+                fn bitxor(self, other: Self) -> Self {
+                    // SAFETY: as above.
+                    Self(unsafe { $xor(self.0, other.0) })
+                }
+            }
+
+            impl Not for $name {
+                type Output = Self;
+
+                #[inline(always)]
+                fn not(self) -> Self {
+                    self ^ Self::splat(Word::MAX)
+                }
+            }
+
+            impl Shl<u32> for $name {
+                type Output = Self;
+
+                #[inline(always)]
+                fn shl(self, bits: u32) -> Self {
+                    // SAFETY: as above.
+                    Self(unsafe { $shl(self.0, _mm_cvtsi32_si128(bits as i32)) })
+                }
+            }
+
+            impl Shr<u32> for $name {
+                type Output = Self;
+
+                #[inline(always)]
+                fn shr(self, bits: u32) -> Self {
+                    // SAFETY: as above.
+                    Self(unsafe { $shr(self.0, _mm_cvtsi32_si128(bits as i32)) })
+                }
+            }
+
+            impl Lanes for $name {
+                const WORDS: usize = $words;
+
+                #[inline(always)]
+                fn splat(word: Word) -> Self {
+                    // SAFETY: as above.
+                    Self(unsafe { $splat(word as i64) })
+                }
+
+                #[inline(always)]
+                fn load(words: &[Word], at: usize) -> Self {
+                    let words: &[Word; $words] = words[at..].first_chunk().expect("enough words");
+                    // SAFETY: as above; and there are as many words.
+                    Self(unsafe { $load(words.as_ptr().cast()) })
+                }
+
+                #[inline(always)]
+                fn store(self, words: &mut [Word], at: usize) {
+                    let words: &mut [Word; $words] = words[at..].first_chunk_mut().expect("enough words");
+                    // SAFETY: as above; and there are as many words.
+                    unsafe { $store(words.as_mut_ptr().cast(), self.0) }
+                }
+
+                #[inline(always)]
+                fn joined(self) -> Word {
+                    let mut words = [0; $words];
+                    self.store(&mut words, 0);
+                    words.into_iter().fold(0, |all, word| all | word)
+                }
+            }
+
+            pub(super) fn $thin(
+                bitmap: &mut Bitmap<'_>,
+                rule: Parallel,
+                scratch: Arena<'_>,
+            ) -> Result<Report, CapacityError> {
+                #[target_feature(enable = $features)]
+                fn compiled(
+                    bitmap: &mut Bitmap<'_>,
+                    rule: Parallel,
+                    scratch: Arena<'_>,
+                ) -> Result<Report, CapacityError> {
+                    thin_in_lanes::<$name>(bitmap, rule, scratch)
+                }
+                // SAFETY: `widths` gives this function away only where there are such registers.
+                unsafe { compiled(bitmap, rule, scratch) }
+            }
+        };
+    }
+
+    lanes!(Avx2 __m256i, 4, "avx2", avx2, _mm256_set1_epi64x, _mm256_loadu_si256, _mm256_storeu_si256,
+        _mm256_and_si256, _mm256_or_si256, _mm256_xor_si256, _mm256_sll_epi64, _mm256_srl_epi64);
+    lanes!(Avx512 __m512i, 8, "avx512f,avx512bw,avx512vl,avx512dq", avx512, _mm512_set1_epi64, _mm512_loadu_si512,
+        _mm512_storeu_si512, _mm512_and_si512, _mm512_or_si512, _mm512_xor_si512, _mm512_sll_epi64, _mm512_srl_epi64);
+}

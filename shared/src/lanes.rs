@@ -1,0 +1,65 @@
+//! Words side by side, on which a bitwise operation works at once: one word, or a register of the machine.
+//!
+//! **In, out**: [`Lanes::WORDS`] words that lie one after the other. **Cost**: one instruction an operation.
+//! Code that is generic over it must be inlined into whoever says which lanes to take, so that it is compiled
+//! for the registers of that caller.
+
+use crate::bitmap::Word;
+use core::ops::{BitAnd, BitOr, BitXor, Not, Shl, Shr};
+
+/// Words side by side. Shifts are of each word by itself.
+pub trait Lanes:
+    Copy
+    + BitAnd<Output = Self>
+    + BitOr<Output = Self>
+    + BitXor<Output = Self>
+    + Not<Output = Self>
+    + Shl<u32, Output = Self>
+    + Shr<u32, Output = Self>
+{
+    /// How many words.
+    const WORDS: usize;
+
+    /// The same word everywhere.
+    fn splat(word: Word) -> Self;
+
+    /// The words from `at` on.
+    ///
+    /// # Panics
+    /// When there are fewer than [`Self::WORDS`].
+    fn load(words: &[Word], at: usize) -> Self;
+
+    /// Write the words from `at` on.
+    ///
+    /// # Panics
+    /// When there are fewer than [`Self::WORDS`].
+    fn store(self, words: &mut [Word], at: usize);
+
+    /// All words, joined by or.
+    fn joined(self) -> Word;
+}
+
+/// What every machine has.
+impl Lanes for Word {
+    const WORDS: usize = 1;
+
+    #[inline(always)]
+    fn splat(word: Word) -> Self {
+        word
+    }
+
+    #[inline(always)]
+    fn load(words: &[Word], at: usize) -> Self {
+        words[at]
+    }
+
+    #[inline(always)]
+    fn store(self, words: &mut [Word], at: usize) {
+        words[at] = self;
+    }
+
+    #[inline(always)]
+    fn joined(self) -> Word {
+        self
+    }
+}

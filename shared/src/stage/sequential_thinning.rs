@@ -1,0 +1,186 @@
+//! Thinning pixel by pixel: each deletion sees the ones before it, so that components and holes stay whatever
+//! the order. [`thin`] goes from the outside in, [`minimal`] leaves lines one pixel wide.
+//!
+//! Source: Pudney 1998 deletes in the order of the distance to the background; between anchors on the ridge of
+//! that distance, which are ours.
+//!
+//! | | |
+//! |---|---|
+//! | in, out | a [`Bitmap`], changed in place; outside is clear |
+//! | scratch | [`scratch_order`] entries |
+//! | cost | a counting sort of the object's pixels, one look at each, and a few at each that the first sweep leaves; [`minimal`]: words, and one look a set pixel |
+
+use crate::arena::Arena;
+use crate::bitmap::{Bitmap, Plane, SetBits, WORD_BITS};
+use crate::limits::{CapacityError, MAX_SIDE};
+use crate::stage::distance::{DISTANCE_PX, Runs};
+use crate::stage::parallel_thinning::Report;
+use core::ops::Range;
+
+/// Whether a pixel with these neighbours is simple: deleting it changes neither the 8-connected
+/// components of the object nor the 4-connected ones of the background. That is so when its crossing
+/// number (Yokoi 1975; Hilditch 1969) is 1: going around, there is one open edge neighbour after which
+/// the object begins.
+pub const SIMPLE: [bool; 256] = {
+    let mut table = [false; 256];
+    let mut code = 0;
+    while code < 256 {
+        let (mut crossings, mut k) = (0, 0);
+        while k < 8 {
+            let from_here = (code as u8).rotate_right(k);
+            if from_here & 0b001 == 0 && from_here & 0b110 != 0 {
+                crossings += 1;
+            }
+            k += 2;
+        }
+        table[code] = crossings == 1;
+        code += 1;
+    }
+    table
+};
+
+/// Entries of scratch that [`thin`] needs: one per set pixel, one per value of their distance.
+pub const fn scratch_order(set_pixels: usize, largest_distance: u16) -> usize {
+    set_pixels + largest_distance as usize + 1
+}
+
+/// Anchors lie further from the background than this, 1/16 px: 1.5 px.
+const ANCHOR_DISTANCE: u16 = DISTANCE_PX * 3 / 2;
+
+/// Anchors have a slope of the distance below 0.70. A slope of 1 makes 8 columns of 16 units each in the
+/// Sobel sums, 128: so gx^2 + gy^2 < (128 * 0.70)^2 = 8028.16, that is, at most 8028.
+const ANCHOR_SLOPE: u32 = 128 * 128 * 49 / 100;
+/// Above the root of that: a slope that is too large whatever the other one is.
+const STEEP: u32 = 90;
+const _: () = assert!(STEEP * STEEP > ANCHOR_SLOPE);
+
+/// Marks an anchor in the list of pixels, above 12 bits of row and 12 of column.
+const ANCHOR: u32 = 1 << 31;
+const COLUMN_BITS: u32 = 12;
+const _: () = assert!(MAX_SIDE <= 1 << COLUMN_BITS);
+
+/// Delete simple pixels in the order of (distance, row, column), except anchors, in sweeps until one
+/// deletes nothing; then, in one sweep of the same order, all simple pixels but end points.
+///
+/// # Errors
+/// A [`CapacityError`] when there is less scratch than [`scratch_order`].
+pub fn thin(
+    bitmap: &mut Bitmap<'_>,
+    distance: &Plane<'_, u16>,
+    scratch: Arena<'_>,
+) -> Result<Report, CapacityError> {
+    let list = sort_by_distance(bitmap, distance, scratch)?;
+    let all = list.len();
+    let (mut left, mut cycles) = (all, 0);
+    loop {
+        let mut kept = 0;
+        for k in 0..left {
+            let entry = list[k];
+            if entry & ANCHOR != 0 || !delete_if(bitmap, entry, |code| SIMPLE[usize::from(code)]) {
+                list[kept] = entry;
+                kept += 1;
+            }
+        }
+        cycles += 1;
+        if kept == left {
+            break;
+        }
+        left = kept;
+    }
+    let thinned = list[..left].iter().filter(|&&entry| delete_if(bitmap, entry, is_removable)).count();
+    Ok(Report { cycles: cycles + 1, deleted: (all - left + thinned) as u32 })
+}
+
+fn delete_if(bitmap: &mut Bitmap<'_>, entry: u32, decide: impl Fn(u8) -> bool) -> bool {
+    let (u, v) = (entry & ((1 << COLUMN_BITS) - 1), (entry & !ANCHOR) >> COLUMN_BITS);
+    let deleted = decide(bitmap.neighbours(u as i32, v as i32));
+    if deleted {
+        bitmap.put(u as usize, v as usize, false);
+    }
+    deleted
+}
+
+/// Simple, and not an end point.
+fn is_removable(neighbours: u8) -> bool {
+    SIMPLE[usize::from(neighbours)] && neighbours.count_ones() >= 2
+}
+
+/// Counting sort of the set pixels by distance, raster order among equals; counts behind the list.
+fn sort_by_distance<'o>(
+    bitmap: &Bitmap<'_>,
+    distance: &Plane<'_, u16>,
+    mut scratch: Arena<'o>,
+) -> Result<&'o mut [u32], CapacityError> {
+    let values = |(v, run): (usize, Range<usize>)| {
+        let row = distance.row(v);
+        run.map(|u| value(row, u)).fold(0, u16::max)
+    };
+    let largest = object_runs(bitmap).map(values).max().unwrap_or(0);
+    let set = bitmap.count();
+    let order = scratch.take::<u32>(scratch_order(set, largest), "entries of the thinning order")?;
+    let (list, next) = order.split_at_mut(set);
+    next.fill(0);
+    for (v, run) in object_runs(bitmap) {
+        let row = distance.row(v);
+        run.for_each(|u| next[usize::from(value(row, u))] += 1);
+    }
+    let mut start = 0;
+    for entry in next.iter_mut() {
+        start += core::mem::replace(entry, start);
+    }
+    for (v, run) in object_runs(bitmap) {
+        let rows = [v.wrapping_sub(1), v, v + 1].map(|v| distance.row(v));
+        for u in run {
+            let d = value(rows[1], u);
+            let place = &mut next[usize::from(d)];
+            let mark = if d > ANCHOR_DISTANCE && is_anchor(rows, u) { ANCHOR } else { 0 };
+            list[*place as usize] = mark | (v as u32) << COLUMN_BITS | u as u32;
+            *place += 1;
+        }
+    }
+    Ok(list)
+}
+
+/// The runs of set pixels in raster order, each with its row.
+fn object_runs<'b>(bitmap: &'b Bitmap<'_>) -> impl Iterator<Item = (usize, Range<usize>)> + 'b {
+    let rows = 0..bitmap.size().height;
+    rows.flat_map(|v| Runs::of(bitmap.row(v as i32)).map(move |run| (v, run)))
+}
+
+/// The distance in a column of a row; 0 outside.
+fn value(row: &[u16], u: usize) -> u16 {
+    row.get(u).copied().unwrap_or(0)
+}
+
+/// Whether the distance is flat in a column of the middle one of three rows, by Sobel's sums.
+fn is_anchor(rows: [&[u16]; 3], u: usize) -> bool {
+    let [[nw, n, ne], [w, _, e], [sw, s, se]] = rows.map(|row| match row.get(u.wrapping_sub(1)..u + 2) {
+        Some(&[west, here, east]) => [west, here, east].map(i32::from),
+        _ => [u.wrapping_sub(1), u, u + 1].map(|u| i32::from(value(row, u))),
+    });
+    let gx = (ne + 2 * e + se - nw - 2 * w - sw).unsigned_abs();
+    if gx >= STEEP {
+        return false;
+    }
+    let gy = (sw + 2 * s + se - nw - 2 * n - ne).unsigned_abs();
+    gy < STEEP && gx * gx + gy * gy <= ANCHOR_SLOPE
+}
+
+/// Delete, in one sweep in raster order, the simple pixels with two or more neighbours: what remains of a
+/// skeleton is one pixel wide. Returns how many went.
+pub fn minimal(bitmap: &mut Bitmap<'_>) -> u32 {
+    let size = bitmap.size();
+    let mut deleted = 0;
+    for v in 0..size.height {
+        for i in 0..size.row_words() {
+            // No later pixel of the word is deleted before its turn.
+            for u in SetBits(bitmap.row(v as i32)[i]).map(|bit| i * WORD_BITS + bit) {
+                if is_removable(bitmap.neighbours(u as i32, v as i32)) {
+                    bitmap.put(u, v, false);
+                    deleted += 1;
+                }
+            }
+        }
+    }
+    deleted
+}

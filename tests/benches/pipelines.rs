@@ -1,0 +1,28 @@
+//! Whole chains: `cargo bench -p system-tests --bench pipelines [-- FILTER]`, where a filter is a part of
+//! `pipeline/image`. On as many threads as `RAYON_NUM_THREADS` says.
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use oracle::images;
+use oracle::kernels::{self, Scope};
+use std::time::Duration;
+
+fn bench(criterion: &mut Criterion) {
+    let images = images::all();
+    for entry in kernels::all().iter().filter(|entry| entry.scope != Scope::Kernel) {
+        let mut group = criterion.benchmark_group(&entry.name);
+        group
+            .sample_size(10)
+            .warm_up_time(Duration::from_millis(100))
+            .measurement_time(Duration::from_secs(1));
+        let enough = if entry.scope == Scope::Alone { &images[..1] } else { &images };
+        for image in enough {
+            group.bench_function(&image.name, |bencher| {
+                let mut kernel = entry.on(image);
+                bencher.iter(|| kernel.run());
+            });
+        }
+    }
+}
+
+criterion_group!(benches, bench);
+criterion_main!(benches);
