@@ -6,18 +6,19 @@
 //! | `skeleton.ply` | its curve skeleton: points with `radius`, mm, and edges |
 //! | `boundary.ply` | its boundary as seen from the left: points and edges |
 //! | `report.json` | every figure ([`crate::report::numbers`]) |
+//! | `report.html` | all of it to look at, in one page ([`page`]), if that was asked for |
 //! | `pictures/*.png` | a picture a stage ([`pictures::NAMES`]), if the record kept rasters |
 //!
 //! Lengths are millimetres in the left camera's axes. Everything is made in a temporary folder inside the
 //! target and moved only when all of it is complete; when something fails before that, the target is left
 //! as it was. Files are moved one after the other: if the system refuses one of these moves, those before it
-//! are new and the rest old. Pictures of an earlier run that this one did not draw are removed, so that a folder speaks of
-//! one run; files of other names are not touched.
+//! are new and the rest old. A page and pictures of an earlier run that this one did not make are removed, so
+//! that a folder speaks of one run; files of other names are not touched.
 
 use crate::export::ExportError;
 use crate::export::ply;
 use crate::reconstruct::Reconstruction;
-use crate::report::{Run, numbers, pictures};
+use crate::report::{Run, numbers, page, pictures};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{GrayImage, RgbImage};
 use rayon::prelude::*;
@@ -27,14 +28,17 @@ use tempfile::NamedTempFile;
 
 /// Sub-folder of the pictures.
 pub(crate) const PICTURES: &str = "pictures";
+/// The page.
+const PAGE: &str = "report.html";
 
-/// Write all files of a run into `folder`, which is created if it is missing; returns the report's text.
+/// Write all files of a run into `folder`, which is created if it is missing, and a page if that is wanted;
+/// returns the report's text.
 ///
 /// # Errors
 /// [`ExportError`] with the file or folder that could not be written.
-pub fn write(folder: &Path, run: &Run<'_>) -> Result<Vec<u8>, ExportError> {
+pub fn write(folder: &Path, run: &Run<'_>, page: bool) -> Result<Vec<u8>, ExportError> {
     let created = create(folder)?;
-    let result = write_into(folder, run);
+    let result = write_into(folder, run, page);
     if result.is_err() {
         for folder in created.iter().rev() {
             // What still holds files stays: then it is no longer ours alone.
@@ -89,7 +93,7 @@ fn failed(path: &Path, source: io::Error) -> ExportError {
     ExportError::Io { path: path.to_path_buf(), source }
 }
 
-fn write_into(folder: &Path, run: &Run<'_>) -> Result<Vec<u8>, ExportError> {
+fn write_into(folder: &Path, run: &Run<'_>, page: bool) -> Result<Vec<u8>, ExportError> {
     let staged = tempfile::Builder::new()
         .prefix(".unfinished-")
         .tempdir_in(folder)
@@ -99,6 +103,10 @@ fn write_into(folder: &Path, run: &Run<'_>) -> Result<Vec<u8>, ExportError> {
     // Only a mesh that could be written is sound enough to be measured.
     let report = numbers::json(run);
     names.push(stage.bytes("report.json", &report)?);
+    if page {
+        let title = folder.file_name().map_or("Ossature".into(), |name| name.to_string_lossy());
+        names.push(stage.bytes(PAGE, page::html(run, &report, &title).as_bytes())?);
+    }
     let drawn = pictures::draw(run);
     if !drawn.is_empty() {
         let pictures = stage.staged.join(PICTURES);
@@ -152,7 +160,7 @@ impl Stage<'_> {
         self.bytes(name, &bytes)
     }
 
-    /// Moves the files to their final names, and removes pictures that are no longer true.
+    /// Moves the files to their final names, and removes a page and pictures that are no longer true.
     fn finish(&self, names: &[String]) -> Result<(), ExportError> {
         for name in names {
             let path = self.folder.join(name);
@@ -168,7 +176,8 @@ impl Stage<'_> {
             let path = self.folder.join(name);
             std::fs::rename(self.staged.join(name), &path).map_err(|source| failed(&path, source))?;
         }
-        for name in pictures::NAMES.iter().map(|name| format!("{PICTURES}/{name}")) {
+        let drawn = pictures::NAMES.iter().map(|name| format!("{PICTURES}/{name}"));
+        for name in drawn.chain([PAGE.to_owned()]) {
             let path = self.folder.join(&name);
             if !names.contains(&name) && path.is_file() {
                 std::fs::remove_file(&path).map_err(|source| failed(&path, source))?;
@@ -213,13 +222,16 @@ mod tests {
     fn a_folder_speaks_of_one_run() {
         let parent = tempfile::tempdir().unwrap();
         let folder = parent.path().join("new/model");
-        write(&folder, &Capsule::new(Mode::Default, Record::new()).run()).unwrap();
-        let files = ["boundary.ply", "model.ply", "pictures", "report.json", "skeleton.ply"];
+        write(&folder, &Capsule::new(Mode::Default, Record::new()).run(), true).unwrap();
+        let files = ["boundary.ply", "model.ply", "pictures", "report.html", "report.json", "skeleton.ply"];
         assert_eq!(names(&folder), files);
         assert_eq!(names(&folder.join(PICTURES)), pictures::NAMES);
         fs::write(folder.join("pictures/mine.png"), "kept").unwrap();
-        write(&folder, &Capsule::new(Mode::Default, Record::figures_only()).run()).unwrap();
-        assert_eq!(names(&folder), files);
+        write(&folder, &Capsule::new(Mode::Default, Record::figures_only()).run(), false).unwrap();
+        assert_eq!(
+            names(&folder),
+            files.iter().filter(|f| **f != "report.html").copied().collect::<Vec<_>>()
+        );
         assert_eq!(names(&folder.join(PICTURES)), ["mine.png"]);
     }
 
@@ -248,7 +260,7 @@ mod tests {
         let capsule = Capsule::new(Mode::Default, Record::figures_only());
         fs::create_dir(parent.path().join("report.json")).unwrap();
         fs::write(parent.path().join("model.ply"), "old").unwrap();
-        let error = write(parent.path(), &capsule.run()).unwrap_err();
+        let error = write(parent.path(), &capsule.run(), false).unwrap_err();
         assert!(error.to_string().ends_with("report.json"), "{error}");
         assert_eq!(names(parent.path()), ["model.ply", "report.json"]);
         assert_eq!(fs::read(parent.path().join("model.ply")).unwrap(), b"old");
@@ -259,10 +271,10 @@ mod tests {
         let parent = tempfile::tempdir().unwrap();
         let mut capsule = Capsule::new(Mode::Default, Record::figures_only());
         fs::write(parent.path().join("file"), "").unwrap();
-        let error = write(&parent.path().join("file/models"), &capsule.run()).unwrap_err();
+        let error = write(&parent.path().join("file/models"), &capsule.run(), false).unwrap_err();
         assert!(error.to_string().ends_with("file/models"), "{error}");
         capsule.made.mesh.faces.push([u32::MAX; 3]);
-        assert!(write(&parent.path().join("a/b"), &capsule.run()).is_err());
+        assert!(write(&parent.path().join("a/b"), &capsule.run(), false).is_err());
         assert_eq!(names(parent.path()), ["file"]);
     }
 }

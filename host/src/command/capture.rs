@@ -107,6 +107,9 @@ pub struct Args {
     /// Tell on standard error how long each stage took
     #[arg(long, conflicts_with = "only_record")]
     timings: bool,
+    /// Leave report.html as well, a page that shows all of it in a browser
+    #[arg(long, conflicts_with = "only_record")]
+    report: bool,
     /// Print one JSON document at the end instead of text
     #[arg(long)]
     json: bool,

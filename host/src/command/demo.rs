@@ -2,7 +2,8 @@
 //!
 //! Renders a shape (torus, torus_tilt, sphere, capsule, screwdriver, block, teapot, mouse or animal),
 //! reconstructs it from the two images alone, and measures how far the model is from the shape. Leaves the images,
-//! calib.yaml, truth.ply, model.ply, skeleton.ply, boundary.ply, report.json and pictures.
+//! calib.yaml, truth.ply, model.ply, skeleton.ply, boundary.ply, report.json, pictures, and report.html, which shows
+//! all of it in a browser: the model turning, both views with every stage, the error in colour.
 //!
 //! Examples:
 //!   host demo
@@ -38,6 +39,9 @@ pub struct Args {
     /// Folder for the results [default: ossature-demo/NAME]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Leave out report.html
+    #[arg(long)]
+    no_report: bool,
     /// Print one JSON document instead of text
     #[arg(long)]
     pub(super) json: bool,
@@ -62,7 +66,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         options: &reconstruct::Options::default(),
         pictures: true,
         truth: Some(&scene.truth),
-        place: Place { folder: &folder, report: args.json },
+        place: Place { folder: &folder, report: args.json, page: !args.no_report },
     };
     let (model, made) = model::make_and_keep(order, &mut Workspace::default())?;
     let found = measure(&made.mesh, &scene);

@@ -79,6 +79,9 @@ pub struct Args {
     /// Tell on standard error how long each stage took
     #[arg(long)]
     timings: bool,
+    /// Leave report.html as well, a page that shows all of it in a browser
+    #[arg(long)]
+    report: bool,
     /// Print lines of JSON instead of text
     #[arg(long)]
     pub(super) json: bool,
@@ -92,7 +95,8 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let model = model_of(&args.calib)?;
     let options = args.grow.device_options();
-    let mut desk = Desk::new((&model, &options), &args.out, (args.json, args.timings));
+    let wanted = Wanted { page: args.report, json: args.json, timings: args.timings };
+    let mut desk = Desk::new((&model, &options), &args.out, wanted);
     let end = args.seconds.map(|seconds| Instant::now() + Duration::from_secs(seconds.into()));
     let stop = interruption()?;
     let mut session = begin(args, &model, &mut desk)?;
@@ -168,19 +172,25 @@ fn start(args: &Args, session: &mut Session) -> Result<(), SessionError> {
     session.order_cameras(&ToDevice::Start)
 }
 
+/// What is wanted beside the models.
+#[derive(Clone, Copy)]
+pub(super) struct Wanted {
+    /// A page about each.
+    pub(super) page: bool,
+    /// JSON in place of text.
+    pub(super) json: bool,
+    /// How long each stage took.
+    pub(super) timings: bool,
+}
+
 /// Makes the models of a recording again.
 ///
 /// # Errors
 ///
 /// If the recording cannot be read, or no pair gives a model.
-pub(super) fn replay(
-    path: &Path,
-    options: &Options,
-    out: &Path,
-    (json, timings): (bool, bool),
-) -> Result<(), Failure> {
+pub(super) fn replay(path: &Path, options: &Options, out: &Path, wanted: Wanted) -> Result<(), Failure> {
     let recording = Recording::read(path)?;
-    let mut desk = Desk::new((&recording.calibration, options), out, (json, timings));
+    let mut desk = Desk::new((&recording.calibration, options), out, wanted);
     let (mut inbox, mut tally) = (Inbox::new()?, Tally::default());
     for (k, bytes) in recording.connections.iter().enumerate() {
         let mut buffer = vec![0; MAX_FRAME];
@@ -211,6 +221,7 @@ struct Desk<'a> {
     model: &'a PairModel,
     options: &'a Options,
     out: &'a Path,
+    page: bool,
     json: bool,
     /// If they are wanted.
     timings: Option<Timings>,
@@ -222,14 +233,11 @@ struct Desk<'a> {
 }
 
 impl<'a> Desk<'a> {
-    fn new(
-        (model, options): (&'a PairModel, &'a Options),
-        out: &'a Path,
-        (json, timings): (bool, bool),
-    ) -> Self {
+    fn new((model, options): (&'a PairModel, &'a Options), out: &'a Path, wanted: Wanted) -> Self {
         let (bar, start, workspace) = (progress(), Instant::now(), Workspace::default());
-        let timings = timings.then(Timings::begin);
-        Self { model, options, out, json, timings, workspace, bar, start, pairs: 0, models: 0 }
+        let timings = wanted.timings.then(Timings::begin);
+        let Wanted { page, json, .. } = wanted;
+        Self { model, options, out, page, json, timings, workspace, bar, start, pairs: 0, models: 0 }
     }
 
     /// A line to standard error.
@@ -264,7 +272,7 @@ impl<'a> Desk<'a> {
         self.pairs += 1;
         let folder = self.out.join(format!("{:06}", self.pairs));
         let told = heading(&pair);
-        let place = Place { folder: &folder, report: self.json };
+        let place = Place { folder: &folder, report: self.json, page: self.page };
         match model::receive((inbox, *pair), self.model, self.options, place, &mut self.workspace) {
             Ok(model) => {
                 self.models += 1;

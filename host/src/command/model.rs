@@ -38,6 +38,8 @@ pub(super) struct Place<'a> {
     pub(super) folder: &'a Path,
     /// Whether the report is wanted here as well.
     pub(super) report: bool,
+    /// Whether there is to be a page about it.
+    pub(super) page: bool,
 }
 
 /// What is told of a model; its surface is in its file alone.
@@ -126,7 +128,7 @@ impl Model {
     /// Writes all files of a run that began at `start`.
     fn written(place: Place<'_>, run: &Run<'_>, start: Instant) -> Result<Self, Failure> {
         let begun = Instant::now();
-        let report = output::write(place.folder, run)?;
+        let report = output::write(place.folder, run, place.page)?;
         let mesh = &run.reconstruction.mesh;
         let bounds = mesh.bounds();
         Ok(Self {

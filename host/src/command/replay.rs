@@ -39,6 +39,7 @@ use image::GrayImage;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 
+use super::listen::Wanted;
 use super::model::{self, Model, Order, Place};
 use super::options::{CameraArgs, MethodArgs, SceneArgs, usage};
 use super::table::Table;
@@ -84,6 +85,9 @@ pub struct Args {
     /// Tell on standard error how long each stage took
     #[arg(long)]
     timings: bool,
+    /// Leave report.html as well, a page that shows all of it in a browser
+    #[arg(long)]
+    report: bool,
     /// Print one JSON document instead of text
     #[arg(long)]
     json: bool,
@@ -115,10 +119,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         && is_recording(Path::new(input))
     {
         let options = recording_options(args)?;
-        return told_in_line(
-            args.json,
-            listen::replay(Path::new(input), &options, &args.out, (args.json, args.timings)),
-        );
+        let wanted = Wanted { page: args.report, json: args.json, timings: args.timings };
+        return told_in_line(args.json, listen::replay(Path::new(input), &options, &args.out, wanted));
     }
     let mut options = if args.as_device { args.method.device_options() } else { args.method.options() }?;
     let one_file = args.layout.filter(|layout| *layout != Layout::Two);
@@ -225,7 +227,7 @@ fn one(
     let make = || {
         let (calibration, beside) = args.cameras.of(pair, &images[0])?;
         let (images, calibration) = scene.apply(images, &calibration)?;
-        let (loading, place) = (start.elapsed(), Place { folder, report: args.json });
+        let (loading, place) = (start.elapsed(), Place { folder, report: args.json, page: args.report });
         if args.as_device {
             let model = model::make_as_device(images, &calibration, options, place, workspace)?;
             return Ok((loading, model, beside));

@@ -165,7 +165,7 @@ pub(super) fn study(subject: &Subject, effort: &Effort, folder: &Path) -> Result
             record: &record,
             truth: Some(&subject.truth),
         };
-        output::write(folder, &run)?;
+        output::write(folder, &run, false)?;
     }
     let own = |options: Options| subject.model(&options, &mut Record::figures_only()).map(|made| made.mesh);
     let mesh = |way: Way| match way {

@@ -1,11 +1,13 @@
 //! What a run says, in the order in which it arises: what the core made ([`record`]), how long it took ([`times`]),
-//! the figures (`report.json`, [`numbers`]), the pictures ([`pictures`]), and sentences for people ([`words`]).
+//! the figures (`report.json`, [`numbers`]), the pictures ([`pictures`]), the page ([`page`]), and sentences for
+//! people ([`words`]).
 
 pub mod words;
 pub mod record;
 pub mod times;
 pub mod numbers;
 pub mod pictures;
+pub mod page;
 
 use crate::calibration::StereoCamera;
 use crate::mesh::Mesh;

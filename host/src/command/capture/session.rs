@@ -196,7 +196,7 @@ impl<'a> Session<'a> {
             options: self.options,
             pictures: !self.args.no_pictures,
             truth: None,
-            place: Place { folder, report: self.args.json && self.args.best },
+            place: Place { folder, report: self.args.json && self.args.best, page: self.args.report },
         };
         let model = model::make(order, &mut self.workspace)?;
         if let Some(timings) = &mut self.timings {

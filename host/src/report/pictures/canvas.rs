@@ -15,7 +15,7 @@ use std::convert::Infallible;
 /// A point of the picture, px.
 pub(super) type Place = Vector2<f64>;
 /// Red, green, blue.
-pub(super) type Colour = [u8; 3];
+pub(crate) type Colour = [u8; 3];
 
 /// Width of a line of large letters, px.
 pub(super) fn text_width(text: &str) -> u32 {

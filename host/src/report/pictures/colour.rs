@@ -1,6 +1,6 @@
 //! Colours that stay apart for every kind of colour vision.
 
-use super::canvas::Colour;
+pub(crate) use super::canvas::Colour;
 
 /// Behind everything.
 pub(super) const PAPER: Colour = [250, 250, 248];
@@ -22,7 +22,7 @@ pub(super) const OBJECT: Colour = [74, 78, 88];
 pub(super) const GROUND: Colour = [24, 25, 30];
 
 /// The palette of Okabe and Ito (2008) without black, for things side by side.
-pub(super) const APART: [Colour; 7] = [
+pub(crate) const APART: [Colour; 7] = [
     [86, 180, 233],
     [230, 159, 0],
     [0, 158, 115],
@@ -46,7 +46,7 @@ const VIRIDIS: [Colour; 9] = [
 ];
 
 /// A shade for a value from 0 to 1, evenly brighter with it.
-pub(super) fn shade(value: f64) -> Colour {
+pub(crate) fn shade(value: f64) -> Colour {
     let place = value.clamp(0.0, 1.0) * (VIRIDIS.len() - 1) as f64;
     let low = (place as usize).min(VIRIDIS.len() - 2);
     mix(VIRIDIS[low], VIRIDIS[low + 1], place - low as f64)

@@ -1,8 +1,8 @@
 //! Pictures of what each stage made, for people: a sheet a stage, both views side by side, cropped to the
 //! object and enlarged by a whole number, so that pixels stay to be seen.
 
-mod canvas;
-mod colour;
+pub(crate) mod canvas;
+pub(crate) mod colour;
 pub(crate) mod eye;
 pub(crate) mod gallery;
 mod histogram;
