@@ -115,6 +115,8 @@ part_lint() {
 part_test() {
     ruler
     emulator
+    # What the report page is looked at with.
+    need chromium chromium
     tests cargo test --workspace --locked --no-fail-fast
     # The frozen bits again, as the optimiser makes them, and the command that a newcomer runs first.
     tests cargo test --release --locked -p system-tests --test determinism --test warp

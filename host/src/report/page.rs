@@ -6,7 +6,7 @@
 //!   security policy without any source). It reads on a phone and in the dark.
 //!
 //! Plotly, which the crate `plotly` carries, draws what turns and what is plotted
-//! (`docs/decisions/0016-report-page.md`); the views are SVG.
+//! (`docs/decisions/0017-report-page.md`); the views are SVG.
 
 mod space;
 mod views;
