@@ -98,7 +98,7 @@ fn write_into(folder: &Path, run: &Run<'_>, page: bool) -> Result<Vec<u8>, Expor
         .prefix(".unfinished-")
         .tempdir_in(folder)
         .map_err(|source| failed(folder, source))?;
-    let stage = Stage { folder, staged: staged.path() };
+    let stage = Stage { folder, staged: staged.path(), was_result: is_result(folder) };
     let mut names = stage.models(run.reconstruction)?;
     // Only a mesh that could be written is sound enough to be measured.
     let report = numbers::json(run);
@@ -123,6 +123,8 @@ fn write_into(folder: &Path, run: &Run<'_>, page: bool) -> Result<Vec<u8>, Expor
 struct Stage<'a> {
     folder: &'a Path,
     staged: &'a Path,
+    /// Whether the folder held the results of an earlier run: only then is a page in it one of ours.
+    was_result: bool,
 }
 
 impl Stage<'_> {
@@ -177,7 +179,7 @@ impl Stage<'_> {
             std::fs::rename(self.staged.join(name), &path).map_err(|source| failed(&path, source))?;
         }
         let drawn = pictures::NAMES.iter().map(|name| format!("{PICTURES}/{name}"));
-        for name in drawn.chain([PAGE.to_owned()]) {
+        for name in drawn.chain(self.was_result.then(|| PAGE.to_owned())) {
             let path = self.folder.join(&name);
             if !names.contains(&name) && path.is_file() {
                 std::fs::remove_file(&path).map_err(|source| failed(&path, source))?;
@@ -227,6 +229,11 @@ mod tests {
         assert_eq!(names(&folder), files);
         assert_eq!(names(&folder.join(PICTURES)), pictures::NAMES);
         fs::write(folder.join("pictures/mine.png"), "kept").unwrap();
+        let foreign = parent.path().join("foreign");
+        fs::create_dir(&foreign).unwrap();
+        fs::write(foreign.join(PAGE), "kept").unwrap();
+        write(&foreign, &Capsule::new(Mode::Default, Record::figures_only()).run(), false).unwrap();
+        assert_eq!(fs::read(foreign.join(PAGE)).unwrap(), b"kept");
         write(&folder, &Capsule::new(Mode::Default, Record::figures_only()).run(), false).unwrap();
         assert_eq!(
             names(&folder),

@@ -16,7 +16,7 @@ mod workspace;
 pub use device::{describe, optics};
 pub(crate) use options::settings;
 pub use options::{Mode, Options, Pieces, Profile, Radius, Skeleton};
-pub use workspace::{Solid, Workspace};
+pub use workspace::Workspace;
 
 use crate::calibration::StereoCamera;
 use crate::curves::Curves;

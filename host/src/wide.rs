@@ -16,7 +16,7 @@ pub fn kernels() -> Kernels {
 }
 
 /// Thinning in registers wider than a word, the narrowest first, where this machine has them.
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", target_pointer_width = "64"))]
 pub fn widths() -> [(&'static str, Option<Thin>); 2] {
     let avx512 = is_x86_feature_detected!("avx512f")
         && is_x86_feature_detected!("avx512bw")
@@ -27,12 +27,12 @@ pub fn widths() -> [(&'static str, Option<Thin>); 2] {
 }
 
 /// Thinning in registers wider than a word: there is none for this kind of machine.
-#[cfg(not(target_arch = "x86_64"))]
+#[cfg(not(all(target_arch = "x86_64", target_pointer_width = "64")))]
 pub fn widths() -> [(&'static str, Option<Thin>); 0] {
     []
 }
 
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", target_pointer_width = "64"))]
 mod x86 {
     use core::arch::x86_64::*;
     use core::ops::{BitAnd, BitOr, BitXor, Not, Shl, Shr};
@@ -63,6 +63,8 @@ mod x86 {
          $store:ident, $and:ident, $or:ident, $xor:ident, $shl:ident, $shr:ident, $with:ident) => {
             #[derive(Clone, Copy)]
             struct $name($register);
+
+            const _: () = assert!(size_of::<[Word; $words]>() == size_of::<$register>());
 
             impl BitAnd for $name {
                 type Output = Self;

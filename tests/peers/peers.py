@@ -106,17 +106,17 @@ def euclidean_skeleton(image):
 
 
 def keeps_the_topology(image, _theirs, ours):
-    """Another rule than the peer's: as many components and holes as the mask, and nearly no width."""
+    """Another rule than the peer's: within the mask, with its components and holes."""
     skeleton = np.frombuffer(ours, np.uint8).reshape(image.mask.shape)
     if np.any(skeleton & ~image.mask):
         return False
-    return euler_number(image.mask) == euler_number(skeleton)
+    return pieces_and_holes(image.mask) == pieces_and_holes(skeleton)
 
 
-def euler_number(mask):
+def pieces_and_holes(mask):
     pieces = cv2.connectedComponents(mask, connectivity=8)[0]
     holes = cv2.connectedComponents(cv2.copyMakeBorder(255 - mask, 1, 1, 1, 1, 0, value=255), connectivity=4)[0]
-    return pieces - holes
+    return pieces, holes
 
 
 def precise_distance(image):

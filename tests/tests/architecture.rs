@@ -119,7 +119,7 @@ fn the_core_has_no_std_no_alloc_and_floats_only_in_the_camera_model() {
 }
 
 #[test]
-fn unsafe_stays_on_the_board() {
+fn unsafe_stays_with_registers() {
     for package in ["shared", "host", "firmware", "tests"] {
         for file in rust_files(&root().join(package)) {
             let allowed = file.strip_prefix(root()).unwrap().starts_with("firmware/src/board");

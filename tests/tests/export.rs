@@ -125,6 +125,24 @@ fn a_skeleton_is_the_same_in_every_format() {
 }
 
 #[test]
+fn points_without_edges_stay_points() {
+    let folder = tempfile::tempdir().unwrap();
+    let source = within(folder.path(), "boundary.ply");
+    let points = Curves { points: skeleton().points, ..Curves::default() };
+    host::export::ply::write_curves(Path::new(&source), &points, &[]).unwrap();
+    let [glb, obj] = ["points.glb", "points.obj"].map(|name| within(folder.path(), name));
+    host(&["convert", &source, &glb]).unwrap();
+    let (document, buffers, _) = gltf::import(&glb).unwrap();
+    let primitive = document.meshes().next().unwrap().primitives().next().unwrap();
+    assert_eq!(primitive.mode(), gltf::mesh::Mode::Points);
+    let reader = primitive.reader(|buffer| Some(&buffers[buffer.index()]));
+    assert_eq!(reader.read_positions().unwrap().count(), points.points.len());
+    host(&["convert", &source, &obj]).unwrap();
+    let text = std::fs::read_to_string(obj).unwrap();
+    assert_eq!(text.lines().filter(|line| line.starts_with("p ")).count(), points.points.len());
+}
+
+#[test]
 fn what_a_format_cannot_hold_is_refused_in_words() {
     let folder = tempfile::tempdir().unwrap();
     let [mesh, curves] = ["mesh.ply", "curves.ply"].map(|name| within(folder.path(), name));

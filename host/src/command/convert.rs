@@ -54,7 +54,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if args.json {
         let (name, number) = elements;
         return say_json(&json!({
-            "input": input, "output": args.output, "kind": kind, "vertices": points, name: number,
+            "input": input.display().to_string(), "output": args.output.display().to_string(), "kind": kind, "vertices": points, name: number,
         }));
     }
     let mut table = Table::new(&args.output.display().to_string());

@@ -2,14 +2,14 @@
 //!
 //! glTF is in metres with y up. A model stands as the left camera sees it: x right, y up, z towards the
 //! camera. So (x, y, z) mm become (x, -y, -z) / 1000, a half turn about x, and faces stay outward. Curves
-//! are lines, with the radius of each point, metres, as the attribute `_RADIUS`.
+//! are lines, or points where there are no edges, with the radius of each point, metres, as the attribute `_RADIUS`.
 
 use std::path::Path;
 
 use nalgebra::{Point3, Vector3};
 use serde_json::{Value, json};
 
-use super::{ExportError, TITLE, write_bytes};
+use super::{ExportError, write_bytes};
 use crate::curves::Curves;
 use crate::mesh::Mesh;
 
@@ -19,6 +19,7 @@ const FLOAT: u32 = 5126;
 const ARRAY_BUFFER: u32 = 34962;
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 /// Primitive modes of the specification.
+const POINTS: u32 = 0;
 const LINES: u32 = 1;
 const TRIANGLES: u32 = 4;
 
@@ -50,8 +51,11 @@ pub fn write_curves(path: &Path, curves: &Curves) -> Result<(), ExportError> {
         let metres = curves.radii.iter().map(|r| (r / 1000.0) as f32);
         attributes["_RADIUS"] = buffer.accessor("SCALAR", FLOAT, ARRAY_BUFFER, metres.map(f32::to_le_bytes));
     }
-    let indices = buffer.indices(curves.edges.as_flattened());
-    let primitive = json!({ "attributes": attributes, "indices": indices, "mode": LINES, "material": 0 });
+    let mut primitive = json!({ "attributes": attributes, "mode": POINTS, "material": 0 });
+    if !curves.edges.is_empty() {
+        primitive["indices"] = buffer.indices(curves.edges.as_flattened());
+        primitive["mode"] = json!(LINES);
+    }
     buffer.write(path, "curves", &primitive)
 }
 
@@ -128,7 +132,7 @@ impl Buffer {
     /// Writes the file: a header, the JSON, the binary part; each padded to four bytes.
     fn write(self, path: &Path, name: &str, primitive: &Value) -> Result<(), ExportError> {
         let root = json!({
-            "asset": { "version": "2.0", "generator": TITLE },
+            "asset": { "version": "2.0", "generator": "Ossature" },
             "scene": 0,
             "scenes": [{ "nodes": [0] }],
             "nodes": [{ "mesh": 0, "name": name }],

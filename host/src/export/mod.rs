@@ -5,8 +5,8 @@
 //! * [`stl`]: meshes for printing; [`obj`]: meshes and curves for modelling; [`glb`]: both for showing.
 //! * [`swc`]: skeletons for those who study trees and neurons.
 //!
-//! Lengths are millimetres in the left camera's axes, but in [`glb`], which says metres. A file is written beside its final name and renamed
-//! when it is complete, so that nothing half-written ever stands under that name.
+//! Lengths are millimetres in the left camera's axes, but in [`glb`], which says metres. A file is written beside its
+//! final name and renamed when it is complete, so that nothing half-written ever stands under that name.
 
 pub mod glb;
 pub mod obj;
@@ -23,7 +23,7 @@ use thiserror::Error;
 
 use crate::geometry::Geometry;
 
-/// What a file says of itself, in whatever place its format has for it.
+/// What a file in millimetres says of itself, in whatever place its format has for it.
 const TITLE: &str = "Ossature; unit mm; axes of the left camera: x right, y down, z forward";
 
 /// Why a file was not written.

@@ -1,4 +1,4 @@
-//! Wavefront OBJ: `v` and `f` lines of a mesh, `v` and `l` lines of curves. The format has no unit; a
+//! Wavefront OBJ: `v` and `f` lines of a mesh, `v` and `l` lines of curves, `p` lines of points. The format has no unit; a
 //! comment says mm. Radii of curves do not fit in.
 
 use std::fmt::Display;
@@ -20,12 +20,16 @@ pub fn write_mesh(path: &Path, mesh: &Mesh) -> Result<(), ExportError> {
     write(path, &mesh.vertices, 'f', &mesh.faces)
 }
 
-/// Writes curves.
+/// Writes curves, or points where there are no edges.
 ///
 /// # Errors
 ///
 /// If the file cannot be written.
 pub fn write_curves(path: &Path, curves: &Curves) -> Result<(), ExportError> {
+    if curves.edges.is_empty() {
+        let points: Vec<_> = (0..curves.points.len() as u32).map(|point| [point]).collect();
+        return write(path, &curves.points, 'p', &points);
+    }
     write(path, &curves.points, 'l', &curves.edges)
 }
 

@@ -2,7 +2,8 @@
 //! list of points, each with its radius and the point that it hangs on.
 //!
 //! Lines are `number type x y z radius parent`, mm, numbered from 1, a parent before its children and -1
-//! for a root. Points of branches that meet in the same place become one. The format knows trees alone: an
+//! for a root. Points of branches that meet in the same place become one, and
+//! so do edges between the same two. The format knows trees alone: an
 //! edge that closes a ring is left out, and a comment names its ends.
 
 use std::collections::HashMap;
@@ -57,6 +58,10 @@ impl Forest {
                 neighbours[b].push(a);
             }
         }
+        neighbours.iter_mut().for_each(|list: &mut Vec<usize>| {
+            list.sort_unstable();
+            list.dedup();
+        });
         let mut forest = Self::default();
         let mut place = vec![None; curves.points.len()];
         // Ends first, so that a line begins at an end.

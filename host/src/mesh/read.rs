@@ -100,8 +100,17 @@ fn sound(geometry: Geometry) -> Result<Geometry, String> {
         Geometry::Mesh(mesh) => (&mesh.vertices, mesh.faces.as_flattened(), "triangle"),
         Geometry::Curves(curves) => (&curves.points, curves.edges.as_flattened(), "edge"),
     };
-    if let Some(vertex) = points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
+    if let Some(vertex) = points.iter().position(|p| p.iter().any(|x| !(*x as f32).is_finite())) {
         return Err(format!("a coordinate of vertex {vertex} is not a finite number"));
+    }
+    if let Geometry::Curves(curves) = &geometry {
+        if points.is_empty() {
+            return Err("it has no points".into());
+        }
+        let whole = curves.radii.is_empty() || curves.radii.len() == points.len();
+        if !whole || curves.radii.iter().any(|radius| !(radius.is_finite() && *radius >= 0.0)) {
+            return Err("a radius is missing, negative or not a finite number".into());
+        }
     }
     match elements.iter().find(|&&corner| corner as usize >= points.len()) {
         Some(corner) => Err(format!("a {element} names vertex {corner}, which is not there")),

@@ -34,15 +34,14 @@ pub struct Workspace {
     clock: Clock,
 }
 
-/// A solid that has no surface yet: its round cones are [`Workspace::cones`].
-#[derive(Debug)]
-pub struct Solid {
+/// What is known of a solid beside its round cones, which stand in [`Growth`].
+struct Solid {
     /// What the core says.
-    pub outcome: Outcome,
+    outcome: Outcome,
     /// The rectified cameras, in whose axes it is.
-    pub camera: RectifiedCamera,
+    camera: RectifiedCamera,
     /// Whether the images had to be resampled.
-    pub resampled: bool,
+    resampled: bool,
 }
 
 impl Workspace {
@@ -82,10 +81,7 @@ impl Workspace {
     }
 
     /// The solid of a pair, without its surface.
-    ///
-    /// # Errors
-    /// As [`Self::reconstruct`].
-    pub fn solid(
+    fn solid(
         &mut self,
         views: [&GrayImage; 2],
         calibration: &StereoCamera,
@@ -109,12 +105,6 @@ impl Workspace {
         let solid = Solid { outcome, camera, resampled };
         grow(&mut self.growth, &memory, &solid, options, &mut self.clock)?;
         Ok(solid)
-    }
-
-    /// The union of these is the last solid; rectified axes, mm.
-    #[must_use]
-    pub fn cones(&self) -> &[RoundCone] {
-        &self.growth.cones
     }
 
     /// Give back the lists of what was made and is done with, for the next pair.

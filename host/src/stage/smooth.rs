@@ -159,9 +159,6 @@ impl Desk {
     /// The excess at a ball by robust local linear regression.
     fn estimate(&mut self, here: &Place, around: [&[Place]; 3], ranked: &[(f64, u32)]) -> f64 {
         let total = self.gather(here, around);
-        if total < 1e-9 {
-            return here.excess;
-        }
         let median = self.median(ranked);
         let ridge = Vector3::from(RIDGE) * total.max(0.3);
         let mut round = 1;

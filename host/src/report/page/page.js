@@ -160,6 +160,8 @@ function summarise() {
 
 function drawAll() {
   drawSpace();
+  byId("histogram-part").hidden = !data.histograms.length;
+  byId("shifts-part").hidden = !data.shifts;
   if (data.histograms.length) drawHistogram();
   if (data.shifts) drawShifts();
 }

@@ -70,8 +70,6 @@ struct Lines {
     x: Vec<Option<f32>>,
     y: Vec<Option<f32>>,
     z: Vec<Option<f32>>,
-    /// Radius at each point, mm; empty where there is none.
-    radius: Vec<Option<f32>>,
 }
 
 impl Lines {
@@ -95,8 +93,7 @@ impl Lines {
                 p[axis]
             })
         };
-        let radius = if curves.radii.is_empty() { Vec::new() } else { of(&|i| curves.radii[i]) };
-        Self { points, x: at(0), y: at(1), z: at(2), radius }
+        Self { points, x: at(0), y: at(1), z: at(2) }
     }
 }
 

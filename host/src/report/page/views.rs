@@ -29,7 +29,7 @@ const LAYERS: [(&str, &str, bool); 9] = [
     ("matches", "correspondence", false),
 ];
 
-/// Rows of the object between which matches are drawn: about so many in all.
+/// Matched points are drawn in about so many rows of the object.
 const ROWS: i32 = 40;
 
 /// The part of a view that is shown, px.
@@ -235,7 +235,7 @@ fn hull(run: &Run<'_>, side: Side, parts: &Parts) -> String {
     html
 }
 
-/// The matched points, dark far and yellow near, and through every few rows what belongs together.
+/// The matched points of every few rows, dark far and yellow near.
 fn matches(run: &Run<'_>, side: Side) -> String {
     let (left, pair) = (&run.record.eyes[0].parts, &run.record.pair);
     if pair.rows.len() != left.contour.len() {
