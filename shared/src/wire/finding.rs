@@ -9,7 +9,7 @@ use crate::limits::CapacityError;
 use crate::pipeline::{Finding, Side};
 
 /// What a [`CapacityError`] can be about, by its code; code 0 is anything else. Names are appended.
-const LISTS: [&str; 35] = [
+const LISTS: [&str; 40] = [
     "memory",
     "ball depths",
     "balls",
@@ -45,6 +45,11 @@ const LISTS: [&str; 35] = [
     "pixels in a picture",
     "control points of a fit",
     "entries of a fit",
+    "bytes of a mask",
+    "points in a disc",
+    "right points",
+    "runs of a row",
+    "strips",
 ];
 
 pub(super) const fn side_code(side: Side) -> u32 {
