@@ -2,7 +2,7 @@
 //!
 //! * **In**: points of `D` coordinates in the order of their curves.
 //! * **Out**: for a place, the runs of consecutive points that a search cannot rule out, nearer boxes first.
-//! * **How**: a tree of boxes over runs of [`RUN`] points. The order of the points is that of the leaves: nothing
+//! * **How**: a tree of boxes over runs of `RUN` points. The order of the points is that of the leaves: nothing
 //!   is sorted, and building is one pass. Points in another order are found all the same, but slower.
 //! * **Cost**: linear to build, about logarithmic a search; the memory is kept for the next points.
 

@@ -1,6 +1,6 @@
 //! The core's inner loops in the widest registers that this machine has.
 //!
-//! What a register holds is told by [`Lanes`]; the loops are the core's own, compiled once more for each
+//! What a register holds is told by [`Lanes`](shared::lanes::Lanes); the loops are the core's own, compiled once more for each
 //! width. The only place of the host that is `unsafe`: registers may be used only where the machine has
 //! them, which is asked for once.
 

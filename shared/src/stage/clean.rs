@@ -10,7 +10,7 @@
 //! | bounds | areas below 2^24 + 1 px |
 //! | cost | a pass over the words and their runs, and the area of what is taken away or filled; closing and opening four passes over the words each |
 //!
-//! Components are found by their runs ([`components`]); only one that goes is looked at again. It is flooded
+//! Components are found by their runs (`components.rs`); only one that goes is looked at again. It is flooded
 //! word by word: fresh pixels wait in the bitmap `front`, a visit takes a word of them, completes its runs by
 //! a carry and reaches into the eight words around it. Rows are visited in sweeps, down then up, over the box
 //! of words in which fresh pixels wait. A word is visited only after it gained a pixel, so there are at most
