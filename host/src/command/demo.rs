@@ -73,7 +73,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if args.json {
         return say_json(&json!({
             "shape": shape.name(),
-            "folder": folder,
+            "folder": folder.display().to_string(),
             "size_mm": <[f64; 3]>::from(model.size),
             "size_error_mm": size_error(&model, &scene),
             "warnings": &model.warnings,

@@ -284,7 +284,7 @@ impl<'a> Desk<'a> {
                     || {
                         let (mut told, more) = (
                             told.clone(),
-                            json!({ "folder": folder, "warnings": warnings, "report": model.report }),
+                            json!({ "folder": folder.display().to_string(), "warnings": warnings, "report": model.report }),
                         );
                         merge(&mut told, more);
                         told

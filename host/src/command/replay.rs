@@ -292,7 +292,7 @@ fn as_json(done: &[Done<'_>], found: &Found) -> serde_json::Value {
     let pair = |Done { pair, folder, result }: &Done<'_>| match result {
         Ok(Success { model, warnings, calibration, .. }) => json!({
             "name": pair.name,
-            "folder": folder,
+            "folder": folder.display().to_string(),
             "calibration_found": calibration,
             "warnings": warnings,
             "report": model.report,
