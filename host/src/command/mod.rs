@@ -26,6 +26,7 @@ pub mod experiments;
 pub mod inspect;
 pub mod list_devices;
 pub mod listen;
+pub mod looks;
 mod batch;
 mod connect;
 pub mod convert;

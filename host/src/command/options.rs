@@ -295,6 +295,14 @@ pub(super) fn check_focal(focal: f64, width: u32) -> Result<(), String> {
     ))
 }
 
+/// A number from 0 to `most`.
+pub(super) fn share_of(most: f64) -> impl Fn(&str) -> Result<f64, String> + Clone {
+    move |text| match text.parse::<f64>() {
+        Ok(number) if (0.0..=most).contains(&number) => Ok(number),
+        _ => Err(format!("must be 0 to {most}")),
+    }
+}
+
 /// A positive number.
 pub(super) fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {

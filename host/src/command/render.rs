@@ -13,12 +13,14 @@
 //!   host replay pair --out model
 //!   host evaluate model/pair/model.ply pair/truth.ply
 //!   host render torus --noise 10 --salt-and-pepper 0.02 --out noisy
+//!   host render teapot --texture clouds --gloss 0.5 --gamma 2.2 --gain 1,1.1 --out hard
 
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use nalgebra::Point3;
 
+use super::looks::Looks;
 use super::options::{check_focal, positive, usage};
 use super::scene::{Scene, write};
 use super::table::{Table, sides};
@@ -26,7 +28,6 @@ use super::{Failure, note, say};
 use crate::calibration::StereoCamera;
 use crate::mesh::Mesh;
 use crate::mesh::read::read;
-use crate::render::Noise;
 use crate::shape::{Shape, UnknownShape};
 use crate::view::{Calibrated, View};
 
@@ -60,15 +61,8 @@ pub struct Args {
     /// Distance to the middle of the object, mm, with --place auto
     #[arg(long, value_name = "MM", value_parser = positive, default_value_t = 450.0)]
     distance: f64,
-    /// Gaussian noise, grey levels
-    #[arg(long, value_name = "SIGMA", default_value_t = 0.0, value_parser = share_of(255.0))]
-    noise: f64,
-    /// Share of the pixels that are stuck at black or white
-    #[arg(long, value_name = "FRACTION", default_value_t = 0.0, value_parser = share_of(1.0))]
-    salt_and_pepper: f64,
-    /// Seed of the noise
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    seed: u64,
+    #[command(flatten)]
+    looks: Looks,
     /// Folder for the files
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -104,15 +98,12 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
     let warnings = views.iter().zip(["left", "right"]).map(|(view, eye)| seen(&mesh, view, eye));
     let warnings = warnings.collect::<Result<Vec<_>, _>>()?;
-    let mut scene = Scene::new(mesh, calibration);
+    let mut scene = Scene::with_looks(mesh, calibration, &args.looks);
     check_shown(&scene)?;
     for warning in warnings.into_iter().flatten() {
         note(&format!("warning: {warning}"));
     }
-    for (eye, image) in (0..).zip(&mut scene.images) {
-        let seed = args.seed.wrapping_mul(2).wrapping_add(eye);
-        Noise { sigma: args.noise, salt_and_pepper: args.salt_and_pepper, seed }.apply(image);
-    }
+    args.looks.disturb(&mut scene.images);
     write(&args.out, &scene)?;
     let mut table = Table::new(&args.what);
     if let Some([low, high]) = scene.truth.bounds() {
@@ -209,12 +200,4 @@ fn size(text: &str) -> Result<[u32; 2], String> {
         |text: &str| text.parse().ok().filter(|side| (16..=shared::limits::MAX_SIDE as u32).contains(side));
     let sides = text.split_once('x').and_then(|(width, height)| Some([side(width)?, side(height)?]));
     sides.ok_or_else(|| format!("must be WIDTHxHEIGHT, each 16 to {}", shared::limits::MAX_SIDE))
-}
-
-/// A number from 0 to `most`.
-fn share_of(most: f64) -> impl Fn(&str) -> Result<f64, String> + Clone {
-    move |text| match text.parse::<f64>() {
-        Ok(number) if (0.0..=most).contains(&number) => Ok(number),
-        _ => Err(format!("must be 0 to {most}")),
-    }
 }

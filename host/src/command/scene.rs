@@ -6,6 +6,7 @@ use std::path::Path;
 use image::GrayImage;
 
 use super::Failure;
+use super::looks::Looks;
 use crate::calibration::StereoCamera;
 use crate::export::{ply, write_whole};
 use crate::mesh::Mesh;
@@ -22,9 +23,14 @@ pub(super) struct Scene {
 }
 
 impl Scene {
-    /// Renders a mesh.
+    /// Renders a mesh, dull and without texture.
     pub(super) fn new(truth: Mesh, calibration: StereoCamera) -> Self {
         Self { images: render(&truth, &Calibrated::pair(&calibration)), calibration, truth }
+    }
+
+    /// Renders a mesh with looks of its own.
+    pub(super) fn with_looks(truth: Mesh, calibration: StereoCamera, looks: &Looks) -> Self {
+        Self { images: looks.images(&truth, &calibration), calibration, truth }
     }
 }
 

@@ -1,5 +1,6 @@
 use std::f64::consts::PI;
 
+use super::material::{BRIGHTEST, DARKEST, LIGHT};
 use super::*;
 use crate::shape::Shape;
 use crate::view::Pinhole;
@@ -118,6 +119,101 @@ fn nothing_to_see_is_background_and_a_camera_inside_sees_only_object() {
     let inside = Pinhole { centre: Point3::new(30.0, 0.0, 450.0), ..view };
     let around = render(&Shape::Sphere.mesh(10.0), &[inside]);
     assert!(around[0].iter().all(|&pixel| f64::from(pixel) >= DARKEST));
+}
+
+fn ball_with(material: Material, sensor: Sensor) -> Vec<GrayImage> {
+    photograph(&Shape::Sphere.mesh(3.0), material, &Pinhole::pair().map(|view| (view, sensor)))
+}
+
+/// Where a ray of the view first meets the ball of the built-in sphere, and the normal there.
+fn on_the_ball(view: &Pinhole, u: f64, v: f64) -> Option<[Vector3<f64>; 2]> {
+    let (middle, ray) = (Vector3::new(30.0, 0.0, 450.0) - view.centre.coords, view.ray(u, v).normalize());
+    let along = middle.dot(&ray);
+    let inside = 3600.0 - middle.norm_squared() + along * along;
+    // Near the rim a pixel sees many normals.
+    (inside > 20.0 * 20.0).then(|| {
+        let point = ray * (along - inside.sqrt());
+        [view.centre.coords + point, (point - middle) / 60.0]
+    })
+}
+
+#[test]
+fn both_eyes_see_the_same_mark_on_the_same_spot() {
+    let plain = ball_with(Material::default(), Sensor::default());
+    for pattern in [Pattern::Checks, Pattern::Clouds] {
+        let texture = Texture { pattern, size: 12.0, contrast: 0.5 };
+        let marked = ball_with(Material { texture, ..Material::default() }, Sensor::default());
+        let [left, right] = Pinhole::pair();
+        let albedo = |eye: usize, u: u32, v: u32| {
+            f64::from(marked[eye].get_pixel(u, v)[0]) / f64::from(plain[eye].get_pixel(u, v)[0])
+        };
+        let (mut seen, mut alike) = (0, 0);
+        let (mut least, mut most) = (1.0_f64, 0.0_f64);
+        for (u, v) in (0..640).flat_map(|u| (0..480).map(move |v| (u, v))) {
+            let Some([point, _]) = on_the_ball(&left, f64::from(u), f64::from(v)) else { continue };
+            let Some((x, y)) = right.project(&point.into()) else { continue };
+            if on_the_ball(&right, x, y).is_none() {
+                continue;
+            }
+            let there = albedo(1, x.round() as u32, y.round() as u32);
+            let here = albedo(0, u, v);
+            (least, most) = (least.min(here), most.max(here));
+            seen += 1;
+            alike += u32::from((here - there).abs() < 0.06);
+        }
+        assert!(seen > 15_000 && least < 0.55 && most > 0.97, "{pattern:?}: {seen} {least} {most}");
+        // Pixels on the edges of checks are mixed differently.
+        assert!(f64::from(alike) > 0.85 * f64::from(seen), "{pattern:?}: {alike} of {seen}");
+    }
+}
+
+#[test]
+fn a_highlight_stands_where_the_normal_is_halfway_between_light_and_eye() {
+    let dull = ball_with(Material::default(), Sensor::default());
+    let glossy = Material { gloss: 0.35, shininess: 200.0, ..Material::default() };
+    let images = ball_with(glossy, Sensor { gain: 0.4, ..Sensor::default() });
+    let mut peaks = Vec::new();
+    for (eye, view) in Pinhole::pair().iter().enumerate() {
+        let gain = |u: u32, v: u32| {
+            f64::from(images[eye].get_pixel(u, v)[0]) - 0.4 * f64::from(dull[eye].get_pixel(u, v)[0])
+        };
+        // The middle of what shines most.
+        let (mut sum, mut at) = (0.0, [0.0; 2]);
+        for (u, v) in (0..640).flat_map(|u| (0..480).map(move |v| (u, v))) {
+            let weight = (gain(u, v) - 25.0).max(0.0);
+            sum += weight;
+            at = [at[0] + weight * f64::from(u), at[1] + weight * f64::from(v)];
+        }
+        let at = at.map(|x| x / sum);
+        let [_, normal] = on_the_ball(view, at[0], at[1]).expect("on the ball");
+        let halfway = (LIGHT.normalize() - view.ray(at[0], at[1]).normalize()).normalize();
+        assert!(normal.dot(&halfway) > 0.9995, "{}", normal.dot(&halfway));
+        peaks.push(normal);
+    }
+    // It is not a mark: the two eyes see it on different spots.
+    assert!((peaks[0] - peaks[1]).norm() > 0.03);
+}
+
+#[test]
+fn a_sensor_multiplies_bends_and_clips() {
+    let light = vec![0.0, 10.0, 63.75, 127.5, 200.0, 255.0];
+    let answer = |sensor: Sensor| sensor.develop([6, 1], light.clone()).into_raw();
+    assert_eq!(answer(Sensor::default()), [0, 10, 64, 128, 200, 255]);
+    assert_eq!(answer(Sensor { gain: 1.5, ..Sensor::default() }), [0, 15, 96, 191, 255, 255]);
+    assert_eq!(answer(Sensor { gamma: 2.0, ..Sensor::default() }), [0, 50, 128, 180, 226, 255]);
+}
+
+/// Of a step between two columns: the integral of the Gaussian, which the sum over pixels follows to 0.7 %.
+#[test]
+fn a_blurred_step_is_the_error_function() {
+    let step: Vec<f64> = (0..40 * 40).map(|i| if i % 40 < 20 { 0.0 } else { 200.0 }).collect();
+    for sigma in [1.0, 2.5] {
+        let image = Sensor { blur: sigma, ..Sensor::default() }.develop([40, 40], step.clone());
+        for (u, _, pixel) in image.enumerate_pixels() {
+            let expected = 100.0 * (1.0 + libm::erf((f64::from(u) - 19.5) / (sigma * 2.0_f64.sqrt())));
+            assert!((f64::from(pixel[0]) - expected).abs() < 2.0, "{u}: {} {expected}", pixel[0]);
+        }
+    }
 }
 
 /// Bounds are four standard errors over 307,200 pixels.
