@@ -18,11 +18,17 @@ pub fn kernels() -> Kernels {
 /// Thinning in registers wider than a word, the narrowest first, where this machine has them.
 #[cfg(all(target_arch = "x86_64", target_pointer_width = "64"))]
 pub fn widths() -> [(&'static str, Option<Thin>); 2] {
-    let avx512 = is_x86_feature_detected!("avx512f")
+    // Every machine with these registers has these instructions on words too.
+    let avx2 = is_x86_feature_detected!("avx2")
+        && is_x86_feature_detected!("bmi1")
+        && is_x86_feature_detected!("bmi2")
+        && is_x86_feature_detected!("lzcnt")
+        && is_x86_feature_detected!("popcnt");
+    let avx512 = avx2
+        && is_x86_feature_detected!("avx512f")
         && is_x86_feature_detected!("avx512bw")
         && is_x86_feature_detected!("avx512vl")
         && is_x86_feature_detected!("avx512dq");
-    let avx2 = is_x86_feature_detected!("avx2");
     [("AVX2", avx2.then_some(x86::avx2 as Thin)), ("AVX-512", avx512.then_some(x86::avx512 as Thin))]
 }
 
@@ -174,10 +180,10 @@ mod x86 {
         };
     }
 
-    lanes!(Avx2 __m256i, 4, "avx2", avx2, _mm256_set1_epi64x, _mm256_loadu_si256, _mm256_storeu_si256,
+    lanes!(Avx2 __m256i, 4, "avx2,bmi1,bmi2,lzcnt,popcnt", avx2, _mm256_set1_epi64x, _mm256_loadu_si256, _mm256_storeu_si256,
         _mm256_and_si256, _mm256_or_si256, _mm256_xor_si256, _mm256_sll_epi64, _mm256_srl_epi64,
         avx2_with);
-    lanes!(Avx512 __m512i, 8, "avx512f,avx512bw,avx512vl,avx512dq", avx512, _mm512_set1_epi64, _mm512_loadu_si512,
+    lanes!(Avx512 __m512i, 8, "avx512f,avx512bw,avx512vl,avx512dq,bmi1,bmi2,lzcnt,popcnt", avx512, _mm512_set1_epi64, _mm512_loadu_si512,
         _mm512_storeu_si512, _mm512_and_si512, _mm512_or_si512, _mm512_xor_si512, _mm512_sll_epi64, _mm512_srl_epi64,
         avx512_with);
 }

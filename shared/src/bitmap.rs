@@ -81,17 +81,17 @@ pub struct PixelBox {
 /// One bit a pixel.
 pub struct Bitmap<'a> {
     size: Size,
+    /// Words in a row.
+    row_words: usize,
     words: &'a mut [Word],
 }
 
 impl<'a> Bitmap<'a> {
     /// An empty bitmap in `words`, of which it takes the first [`Size::words`].
     pub fn new(size: Size, words: &'a mut [Word]) -> Result<Self, CapacityError> {
-        let limit = words.len();
-        let words =
-            words.get_mut(..size.words()).ok_or(CapacityError { what: "words in a bitmap", limit })?;
-        words.fill(0);
-        Ok(Self { size, words })
+        let bitmap = Self::over(size, words)?;
+        bitmap.words.fill(0);
+        Ok(bitmap)
     }
 
     /// A bitmap over `words` as they stand, of which it takes the first [`Size::words`]: one that an
@@ -100,7 +100,7 @@ impl<'a> Bitmap<'a> {
         let limit = words.len();
         let words =
             words.get_mut(..size.words()).ok_or(CapacityError { what: "words in a bitmap", limit })?;
-        Ok(Self { size, words })
+        Ok(Self { size, row_words: size.row_words(), words })
     }
 
     /// A bitmap from a drawing: a line a row, `#` set, anything else clear. For tests and examples.
@@ -124,8 +124,7 @@ impl<'a> Bitmap<'a> {
     /// Whether the pixel is set; false outside the image.
     pub fn get(&self, u: i32, v: i32) -> bool {
         self.size.contains(u, v)
-            && self.words[v as usize * self.size.row_words() + u as usize / WORD_BITS]
-                >> (u as usize % WORD_BITS)
+            && self.words[v as usize * self.row_words + u as usize / WORD_BITS] >> (u as usize % WORD_BITS)
                 & 1
                 == 1
     }
@@ -133,7 +132,7 @@ impl<'a> Bitmap<'a> {
     /// Set or clear a pixel; nothing happens outside the image.
     pub fn put(&mut self, u: usize, v: usize, on: bool) {
         if u < self.size.width && v < self.size.height {
-            let word = &mut self.words[v * self.size.row_words() + u / WORD_BITS];
+            let word = &mut self.words[v * self.row_words + u / WORD_BITS];
             let bit = 1 << (u % WORD_BITS);
             if on { *word |= bit } else { *word &= !bit }
         }
@@ -141,7 +140,7 @@ impl<'a> Bitmap<'a> {
 
     /// The words of a row; none outside the image.
     pub fn row(&self, v: i32) -> &[Word] {
-        let n = self.size.row_words();
+        let n = self.row_words;
         match usize::try_from(v) {
             Ok(v) if v < self.size.height => &self.words[v * n..(v + 1) * n],
             _ => &[],
@@ -150,7 +149,7 @@ impl<'a> Bitmap<'a> {
 
     /// The words of a row, to be changed; the caller keeps bits beyond the width clear.
     pub fn row_mut(&mut self, v: i32) -> &mut [Word] {
-        let n = self.size.row_words();
+        let n = self.row_words;
         match usize::try_from(v) {
             Ok(v) if v < self.size.height => &mut self.words[v * n..(v + 1) * n],
             _ => &mut [],
@@ -186,7 +185,7 @@ impl<'a> Bitmap<'a> {
 
     /// Set what is clear and clear what is set, inside the image.
     pub fn invert(&mut self) {
-        let n = self.size.row_words().max(1);
+        let n = self.row_words.max(1);
         let valid = self.valid(n - 1);
         for row in self.words.chunks_exact_mut(n) {
             row.iter_mut().for_each(|word| *word = !*word);
@@ -220,7 +219,7 @@ impl<'a> Bitmap<'a> {
 
     /// Each row that has a set pixel, with its first and its last one: `(v, first, last)`.
     pub fn spans(&self) -> impl Iterator<Item = (usize, usize, usize)> + '_ {
-        self.words.chunks_exact(self.size.row_words().max(1)).enumerate().filter_map(|(v, row)| {
+        self.words.chunks_exact(self.row_words.max(1)).enumerate().filter_map(|(v, row)| {
             let first = row.iter().position(|w| *w != 0)?;
             let last = row.iter().rposition(|w| *w != 0)?;
             Some((
@@ -233,7 +232,7 @@ impl<'a> Bitmap<'a> {
 
     /// The set pixels in raster order.
     pub fn pixels(&self) -> impl Iterator<Item = Pixel> + '_ {
-        let n = self.size.row_words().max(1);
+        let n = self.row_words.max(1);
         self.words.iter().enumerate().flat_map(move |(i, &word)| {
             let (v, u0) = (i / n, i % n * WORD_BITS);
             SetBits(word).map(move |b| Pixel { u: (u0 + b) as u16, v: v as u16 })
@@ -247,9 +246,36 @@ impl<'a> Bitmap<'a> {
         if bit == 0 || bit == WORD_BITS - 1 || !self.size.contains(u, v) {
             return self.neighbours_apart(u, v);
         }
-        let (n, i) = (self.size.row_words(), v as usize * self.size.row_words() + place);
+        self.neighbours_within(v as usize * self.row_words + place, bit)
+    }
+
+    /// [`Self::neighbours`] of a bit of a word, but for its first and last one.
+    #[inline]
+    fn neighbours_within(&self, i: usize, bit: usize) -> u8 {
         let three = |i: usize| at(self.words, i) >> (bit - 1) & 0b111;
-        AROUND_OF_SQUARE[(three(i.wrapping_sub(n)) | three(i) << 3 | three(i + n) << 6) as usize]
+        let (above, here, below) = (i.wrapping_sub(self.row_words), i, i + self.row_words);
+        AROUND_OF_SQUARE[(three(above) | three(here) << 3 | three(below) << 6) as usize]
+    }
+
+    /// The place of a pixel of the image among the bits of all words.
+    pub const fn place(&self, u: usize, v: usize) -> usize {
+        v * self.row_words * WORD_BITS + u
+    }
+
+    /// Clear the pixel at a [`place`](Self::place) if its neighbours are such; whether it was.
+    #[inline]
+    pub fn clear_if(&mut self, place: usize, decide: impl Fn(u8) -> bool) -> bool {
+        let (i, bit) = (place / WORD_BITS, place % WORD_BITS);
+        let neighbours = if bit == 0 || bit == WORD_BITS - 1 {
+            self.neighbours_apart((i % self.row_words * WORD_BITS + bit) as i32, (i / self.row_words) as i32)
+        } else {
+            self.neighbours_within(i, bit)
+        };
+        let goes = decide(neighbours);
+        if let Some(word) = self.words.get_mut(i).filter(|_| goes) {
+            *word &= !(1 << bit);
+        }
+        goes
     }
 
     /// [`Self::neighbours`], some of which lie in another word or outside.

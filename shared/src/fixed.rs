@@ -31,7 +31,39 @@ pub const fn div_round(n: i64, d: i64) -> i64 {
 /// `n / d` rounded down; `d` is not 0. One instruction where both have 32 bits, as they nearly always have: a
 /// microcontroller divides longer ones in software.
 pub const fn div_floor(n: u64, d: u64) -> u64 {
-    if (n | d) >> 32 == 0 { (n as u32 / d as u32) as u64 } else { n / d }
+    if (n | d) >> 32 == 0 {
+        (n as u32 / d as u32) as u64
+    } else if cfg!(target_pointer_width = "64") {
+        n / d
+    } else {
+        div_long(n, d)
+    }
+}
+
+/// `n / d` rounded down; where divisor and quotient have 32 bits by two divisions for 16 bits each (Knuth, The Art of
+/// Computer Programming, 4.3.1 D).
+#[inline(never)]
+const fn div_long(n: u64, d: u64) -> u64 {
+    if d >> 32 != 0 || n >> 32 >= d {
+        return n / d;
+    }
+    let bits = (d as u32).leading_zeros();
+    let (n, d) = (n << bits, (d as u32) << bits);
+    let (high, rest) = digit((n >> 32) as u32, n as u32 >> 16, d);
+    let (low, _) = digit(rest, n as u32 & 0xFFFF, d);
+    (high << 16 | low) as u64
+}
+
+/// Quotient and rest of `high << 16 | next` and `d`, of which `high` is the smaller and `d` has its highest bit.
+const fn digit(high: u32, next: u32, d: u32) -> (u32, u32) {
+    let (d1, d0) = (d >> 16, d & 0xFFFF);
+    let (mut q, mut rest) = (high / d1, high % d1);
+    // At most two too large.
+    while rest >> 16 == 0 && (q >> 16 != 0 || q * d0 > (rest << 16 | next)) {
+        q -= 1;
+        rest += d1;
+    }
+    (q, (high << 16 | next).wrapping_sub(q.wrapping_mul(d)))
 }
 
 /// `v` saturated to `i32`.
@@ -88,6 +120,24 @@ mod tests {
         assert_eq!([div_round(7, 2), div_round(-7, 2), div_round(7, -2), div_round(6, 4)], [4, -4, -4, 2]);
         assert_eq!(div_round(5, 0), 0);
         assert_eq!(div_round(i64::MIN, 1), -i64::MAX);
+    }
+
+    #[test]
+    fn long_division_is_division() {
+        let mut seed = 1u64;
+        let mut random = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 32) as u32
+        };
+        for _ in 0..100_000 {
+            let d = (random() >> (random() % 32)).max(1);
+            let d = if random() % 4 == 0 { d | 0xFFFF_0000 } else { d };
+            let high = random() % d;
+            for low in [0, 0xFFFF, 0xFFFF_0000, u32::MAX, random()] {
+                let n = u64::from(high) << 32 | u64::from(low);
+                assert_eq!(div_long(n, d.into()), n / u64::from(d), "{n} / {d}");
+            }
+        }
     }
 
     #[test]

@@ -22,12 +22,15 @@ pub fn pack<'w>(size: Size, bytes: &[u8], words: &'w mut [Word]) -> Result<Bitma
     let bytes = bytes.get(..size.pixels()).ok_or(CapacityError { what: "bytes of a mask", limit })?;
     let mut bitmap = Bitmap::over(size, words)?;
     for (v, row) in bytes.chunks_exact(size.width.max(1)).enumerate() {
-        for (word, pixels) in bitmap.row_mut(v as i32).iter_mut().zip(row.chunks(WORD_BITS)) {
-            let mut whole = [0; WORD_BITS];
-            *word = packed(pixels.try_into().unwrap_or_else(|_| {
-                whole[..pixels.len()].copy_from_slice(pixels);
-                &whole
-            }));
+        let (wholes, rest) = row.as_chunks();
+        let words = bitmap.row_mut(v as i32);
+        for (word, pixels) in words.iter_mut().zip(wholes) {
+            *word = packed(pixels);
+        }
+        if let Some(word) = words.get_mut(wholes.len()) {
+            let mut pixels = [0; WORD_BITS];
+            pixels[..rest.len()].copy_from_slice(rest);
+            *word = packed(&pixels);
         }
     }
     Ok(bitmap)
@@ -43,17 +46,13 @@ pub fn unpack(bitmap: &Bitmap<'_>, bytes: &mut [u8]) -> Result<(), CapacityError
     // Words without a pixel, most of a skeleton's, cost nothing but their zeros.
     bytes.fill(0);
     for (v, row) in bytes.chunks_exact_mut(size.width.max(1)).enumerate() {
-        for (word, pixels) in bitmap.row(v as i32).iter().zip(row.chunks_mut(WORD_BITS)) {
-            if *word == 0 {
-                continue;
-            }
-            let (eights, rest) = pixels.as_chunks_mut();
-            for (eight, byte) in eights.iter_mut().zip(word.to_le_bytes()) {
-                *eight = unpacked(byte);
-            }
-            if let Some(byte) = word.to_le_bytes().get(eights.len()) {
-                rest.copy_from_slice(&unpacked(*byte)[..rest.len()]);
-            }
+        let (wholes, rest) = row.as_chunks_mut();
+        let words = bitmap.row(v as i32);
+        for (word, pixels) in words.iter().zip(&mut *wholes).filter(|(word, _)| **word != 0) {
+            *pixels = unpacked(*word);
+        }
+        if let Some(word) = words.get(wholes.len()) {
+            rest.copy_from_slice(&unpacked(*word)[..rest.len()]);
         }
     }
     Ok(())
@@ -82,7 +81,16 @@ fn packed_eight(bytes: u64) -> u8 {
 }
 
 /// 255 for each bit that is set.
-fn unpacked(bits: u8) -> [u8; 8] {
+fn unpacked(word: Word) -> [u8; WORD_BITS] {
+    let mut bytes = [0; WORD_BITS];
+    for (eight, bits) in bytes.as_chunks_mut().0.iter_mut().zip(word.to_le_bytes()) {
+        *eight = unpacked_eight(bits);
+    }
+    bytes
+}
+
+/// 255 for each bit that is set.
+fn unpacked_eight(bits: u8) -> [u8; 8] {
     let set = (((u64::from(bits) * ONES) & DIAGONAL) + LOW) >> 7 & ONES;
     (set * 255).to_le_bytes()
 }
@@ -95,7 +103,7 @@ mod tests {
     fn eight_pixels_at_a_time() {
         for bits in 0..=u8::MAX {
             let expected = core::array::from_fn(|k| if bits >> k & 1 == 1 { u8::MAX } else { 0 });
-            assert_eq!(unpacked(bits), expected);
+            assert_eq!(unpacked_eight(bits), expected);
             for value in [1, 127, 128, 255] {
                 assert_eq!(packed_eight(u64::from_le_bytes(expected.map(|byte| byte & value))), bits);
             }

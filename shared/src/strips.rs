@@ -1,19 +1,16 @@
-//! Strips: thin rectangles around a row of points, in a hierarchy, to look at those near a place alone.
+//! Strips: boxes around stretches of a row of points, in a hierarchy, to look at those near a place alone.
 //!
 //! Points that follow each other along a contour, a branch or a raster are neighbours in the plane. Eight of
-//! them lie in a rectangle along their chord, four such stretches in a longer one, and so on (Ballard,
-//! "Strip trees", 1981). The hierarchy is implicit: stretches begin at multiples of their length.
+//! them lie in a small box, four such stretches in a larger one, and so on (after Ballard, "Strip trees", 1981).
+//! The hierarchy is implicit: stretches begin at multiples of their length.
 //!
-//! * **In**: points, |u|, |v| < 2^20, by number; scratch for a strip of 24 bytes per six points.
+//! * **In**: points, |u|, |v| < 2^20, by number; scratch for a strip of 20 bytes per six points.
 //! * **Out**: the points inside a disc, in the order of their numbers.
-//! * **How**: a rectangle's axes are no longer than 1, so that no length measured along them is too long, and its
-//!   sides lie one unit farther out than its points do, so that no rounding brings a point into the disc
-//!   that the rectangle is held apart from.
-//! * **Cost**: building, some 15 instructions a point and level; a walk touches the strips that meet the disc:
+//! * **How**: boxes are upright: one along its chord would be thinner, but takes twice as long to look at.
+//! * **Cost**: building, some 10 instructions a point and level; a walk touches the strips that meet the disc:
 //!   of points along a smooth line a number that grows with the logarithm of theirs.
 
 use crate::arena::Arena;
-use crate::fixed::UNIT;
 use crate::limits::CapacityError;
 use crate::point::PixelPoint;
 use bytemuck::{Pod, Zeroable};
@@ -26,6 +23,8 @@ const FAN_BITS: u32 = 2;
 const MOST_LONGEST: usize = 8;
 /// The level of the longest strips that there can be, of 2^25 points.
 const MAX_LEVEL: u32 = 11;
+/// Bits of a level.
+const PLACE_BITS: u32 = 4;
 
 /// What has a place in the plane.
 pub trait Placed {
@@ -44,60 +43,45 @@ impl Placed for PixelPoint {
 pub struct Disc {
     /// Centre; |u|, |v| < 2^30 + 2^21.
     pub centre: PixelPoint,
-    /// Squared radius, (1/256 px)^2; points that far away are outside, and nothing is inside 0.
-    pub squared: i64,
+    /// Radius, 1/256 px, not below 0; points that far away are outside.
+    pub radius: i32,
 }
 
-/// A rectangle around a stretch of points.
+/// A box around a stretch of points.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 struct Strip {
-    /// Its longer axis, 1/16384.
-    axis: [i16; 2],
-    /// Least coordinates along it and across.
+    /// Least coordinates.
     low: [i32; 2],
-    /// Greatest coordinates along it and across.
+    /// Greatest coordinates.
     high: [i32; 2],
-    level: u32,
+    /// The number of its first point, above [`PLACE_BITS`] bits of its level.
+    place: u32,
 }
 
 impl Strip {
     /// The strip of some points.
-    fn around(stretch: &[impl Placed], level: u32) -> Self {
-        let end = |point: Option<&_>| point.map(Placed::place).unwrap_or_default();
-        let axis = axis(end(stretch.first()), end(stretch.last()));
+    fn around(stretch: &[impl Placed], place: u32) -> Self {
         let (mut low, mut high) = ([i32::MAX; 2], [i32::MIN; 2]);
         for point in stretch {
-            let [s, t] = turned(axis, point.place());
-            (low, high) = ([low[0].min(s), low[1].min(t)], [high[0].max(s), high[1].max(t)]);
+            let PixelPoint { u, v } = point.place();
+            (low, high) = ([low[0].min(u), low[1].min(v)], [high[0].max(u), high[1].max(v)]);
         }
-        Self { axis, low: low.map(|x| x - 1), high: high.map(|x| x + 1), level }
+        Self { low, high, place }
     }
 
     /// Whether it certainly has no point inside the disc.
     fn is_apart(&self, disc: &Disc) -> bool {
-        let [s, t] = turned(self.axis, disc.centre);
-        let along = (self.low[0] - s).max(s - self.high[0]).max(0);
-        let across = (self.low[1] - t).max(t - self.high[1]).max(0);
-        i64::from(along) * i64::from(along) + i64::from(across) * i64::from(across) >= disc.squared
+        let PixelPoint { u, v } = disc.centre;
+        let along = (self.low[0] - u).max(u - self.high[0]);
+        let across = (self.low[1] - v).max(v - self.high[1]);
+        let is_beside = along >= disc.radius || across >= disc.radius;
+        is_beside || along > 0 && across > 0 && square(along) + square(across) >= square(disc.radius)
     }
 }
 
-/// The direction from one point to another, 1/16384, never longer than 1.
-fn axis(from: PixelPoint, to: PixelPoint) -> [i16; 2] {
-    let (u, v) = (to.u - from.u, to.v - from.v);
-    let bits = 32 - (u.unsigned_abs() | v.unsigned_abs()).leading_zeros();
-    // 15 bits of the longer side: lengths below 2^16, products below 2^30.
-    let scaled = |x: i32| if bits > 15 { x >> (bits - 15) } else { x << (15 - bits) };
-    let (u, v) = (scaled(u), scaled(v));
-    let length = (u * u + v * v).cast_unsigned().isqrt().cast_signed() + 1;
-    [u, v].map(|x| ((x * UNIT) / length) as i16)
-}
-
-/// Coordinates along an axis and across, rounded down.
-fn turned([a, b]: [i16; 2], p: PixelPoint) -> [i32; 2] {
-    let (a, b, u, v) = (i64::from(a), i64::from(b), i64::from(p.u), i64::from(p.v));
-    [((a * u + b * v) >> 14) as i32, ((a * v - b * u) >> 14) as i32]
+fn square(x: i32) -> i64 {
+    i64::from(x) * i64::from(x)
 }
 
 /// The strips of a row of points: each before the shorter ones in it.
@@ -113,9 +97,15 @@ const fn length(level: u32) -> usize {
 }
 
 /// How many strips one of a level is with those in it.
-const fn family(level: u32) -> usize {
-    ((1 << (FAN_BITS * (level + 1))) - 1) / ((1 << FAN_BITS) - 1)
-}
+const FAMILY: [usize; 1 << PLACE_BITS] = {
+    let mut family = [1; 1 << PLACE_BITS];
+    let mut level = 1;
+    while level <= MAX_LEVEL as usize {
+        family[level] = (family[level - 1] << FAN_BITS) + 1;
+        level += 1;
+    }
+    family
+};
 
 impl<'a, P: Placed> Strips<'a, P> {
     /// The strips of a row of points.
@@ -133,28 +123,30 @@ impl<'a, P: Placed> Strips<'a, P> {
             (0..=longest).rev().filter(begin_here).map(move |level| (from, level))
         });
         for (strip, (from, level)) in strips.iter_mut().zip(starts) {
-            *strip = Strip::around(&points[from..count.min(from + length(level))], level);
+            let place = (from as u32) << PLACE_BITS | level;
+            *strip = Strip::around(&points[from..count.min(from + length(level))], place);
         }
         Ok(Self { points, strips })
     }
 
     /// Show every point inside the disc, in order: its number, itself, and the disc, which may shrink on the way.
     pub fn walk(&self, mut disc: Disc, mut visit: impl FnMut(usize, &'a P, &mut Disc)) {
-        let (mut i, mut from) = (0, 0);
+        let mut i = 0;
         while let Some(strip) = self.strips.get(i) {
+            let level = strip.place & ((1 << PLACE_BITS) - 1);
             if strip.is_apart(&disc) {
-                i += family(strip.level);
-                from += length(strip.level);
+                i += FAMILY[level as usize];
                 continue;
             }
             i += 1;
-            if strip.level == 0 {
-                for (k, point) in self.points.iter().enumerate().skip(from).take(length(0)) {
-                    if disc.centre.distance_squared(point.place()) < disc.squared {
+            if level == 0 {
+                let from = (strip.place >> PLACE_BITS) as usize;
+                let points = self.points.get(from..).unwrap_or_default();
+                for (k, point) in (from..).zip(&points[..points.len().min(length(0))]) {
+                    if disc.centre.distance_squared(point.place()) < square(disc.radius) {
                         visit(k, point, &mut disc);
                     }
                 }
-                from += length(0);
             }
         }
     }

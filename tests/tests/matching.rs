@@ -274,12 +274,12 @@ fn strips_show_what_lies_inside() {
         let reach = [40, 5000, 1 << 20, 1 << 29][case % 4];
         let mut any = || random.below(2 * reach) as i32 - reach as i32;
         for _ in 0..20 {
-            let (centre, radius) = (PixelPoint { u: any(), v: any() }, i64::from(any().max(0)));
-            let disc = Disc { centre, squared: radius * radius };
+            let (centre, radius) = (PixelPoint { u: any(), v: any() }, any().max(0));
+            let squared = i64::from(radius).pow(2);
             let mut shown = Vec::new();
-            strips.walk(disc, |k, p, _| shown.push((k, *p)));
+            strips.walk(Disc { centre, radius }, |k, p, _| shown.push((k, *p)));
             let inside = points.iter().copied().enumerate();
-            let inside: Vec<_> = inside.filter(|(_, p)| centre.distance_squared(*p) < disc.squared).collect();
+            let inside: Vec<_> = inside.filter(|(_, p)| centre.distance_squared(*p) < squared).collect();
             assert_eq!(shown, inside);
         }
     }

@@ -10,7 +10,7 @@
 
 use crate::arena::Arena;
 use crate::bitmap::Plane;
-use crate::fixed::{ONE, PX, UNIT, div_round};
+use crate::fixed::{ONE, PX, UNIT, div_round, isqrt};
 use crate::limits::{CapacityError, push};
 use crate::point::{Direction, Pixel, PixelPoint};
 use crate::stage::depth::BallDepth;
@@ -77,6 +77,8 @@ impl<'a> Balls<'a> {
     }
 }
 
+/// Pixels of a path that balls are looked for together.
+const TOGETHER: usize = 8;
 /// Balls farther than this from a path's pixel do not count, 1/256 px.
 const REACH: i32 = 2 * PX;
 /// The next ball beyond a free end is at least this far and at most that far ahead, 1/256 px.
@@ -100,8 +102,9 @@ pub fn trace_branch(
     samples: &mut VecView<Sample>,
 ) -> Result<(), CapacityError> {
     let start = samples.len();
-    for pixel in path {
-        if let Some(sample) = average(pixel.centre(), balls) {
+    for pixels in path.chunks(TOGETHER) {
+        let averages = averages(pixels, balls);
+        for sample in averages.iter().take(pixels.len()).filter_map(Average::sample) {
             push(samples, sample, "branch samples")?;
         }
     }
@@ -135,23 +138,46 @@ pub fn trace_pixels(
     Ok(())
 }
 
-/// The weighted average of the balls around a point.
-fn average(at: PixelPoint, balls: &Balls<'_>) -> Option<Sample> {
-    let reach_squared = i64::from(REACH).pow(2);
-    let mut sums = [0i64; 5];
-    let mut total = 0;
-    balls.strips.walk(Disc { centre: at, squared: reach_squared }, |k, ball, _| {
-        let near = reach_squared - at.distance_squared(ball.centre);
-        // At most 2^18 each; 24 bits of their product are kept, so that 2^16 balls fit.
-        let weight = (near * near) >> 12;
-        let Sample { ball: Ball { u, v, rho, d }, weight: trust } = Sample::of(ball, &balls.depths[k]);
-        for (sum, value) in sums.iter_mut().zip([u, v, rho, d, trust]) {
+/// The weighted sum of the balls around a point: of u, v, rho, d and trust, and of the weights.
+#[derive(Clone, Copy, Default)]
+struct Average {
+    sums: [i64; 5],
+    total: i64,
+}
+
+impl Average {
+    fn add(&mut self, weight: i32, Sample { ball: Ball { u, v, rho, d }, weight: trust }: Sample) {
+        let weight = i64::from(weight);
+        for (sum, value) in self.sums.iter_mut().zip([u, v, rho, d, trust]) {
             *sum += weight * i64::from(value);
         }
-        total += weight;
+        self.total += weight;
+    }
+
+    fn sample(&self) -> Option<Sample> {
+        let [u, v, rho, d, weight] = self.sums.map(|s| div_round(s, self.total) as i32);
+        (self.total > 0).then_some(Sample { ball: Ball { u, v, rho, d }, weight })
+    }
+}
+
+/// The average around each of at most [`TOGETHER`] pixels, which lie side by side: what is near to one of them is
+/// looked for once.
+fn averages(pixels: &[Pixel], balls: &Balls<'_>) -> [Average; TOGETHER] {
+    let reach_squared = i64::from(REACH).pow(2);
+    let mut averages = [Average::default(); TOGETHER];
+    let Some(centre) = pixels.get(pixels.len() / 2).map(|p| p.centre()) else { return averages };
+    let far = pixels.iter().map(|p| centre.distance_squared(p.centre())).max().unwrap_or(0);
+    let radius = REACH + isqrt(far.cast_unsigned()) as i32 + 1;
+    balls.strips.walk(Disc { centre, radius }, |k, ball, _| {
+        for (average, pixel) in averages.iter_mut().zip(pixels) {
+            let near = reach_squared - pixel.centre().distance_squared(ball.centre);
+            if near > 0 {
+                // At most 2^18 each; 24 bits of their product are kept, so that 2^16 balls fit.
+                average.add(((near * near) >> 12) as i32, Sample::of(ball, &balls.depths[k]));
+            }
+        }
     });
-    let [u, v, rho, d, weight] = sums.map(|s| div_round(s, total) as i32);
-    (total > 0).then_some(Sample { ball: Ball { u, v, rho, d }, weight })
+    averages
 }
 
 /// Continue the samples from `start` beyond the last one, from ball to ball ahead that does not grow.
@@ -184,7 +210,7 @@ fn continue_tip(start: usize, balls: &Balls<'_>, samples: &mut VecView<Sample>) 
 
 /// Whatever lies less than `step` ahead of a tip, and by little more than a tenth of that aside, is in here.
 fn ahead(tip: PixelPoint, step: i32) -> Disc {
-    Disc { centre: tip, squared: i64::from((step + step / 8 + 2 * PX).max(0)).pow(2) }
+    Disc { centre: tip, radius: (step + step / 8 + 2 * PX).max(0) }
 }
 
 #[cfg(test)]

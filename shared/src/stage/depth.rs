@@ -86,11 +86,18 @@ fn depth(
     let (wp, wq) = (i64::from(p.1.weight) + PLAIN, i64::from(q.1.weight) + PLAIN);
     let plain = div_round(wp * dp + wq * dq, wp + wq);
     let matched = div_round(sum + PLAIN * plain, total + PLAIN);
-    let (f2, rho2) = (i64::from(optics.focal).pow(2), i64::from(rho).pow(2));
-    // f^2 / (f^2 + rho^2) in Q2.30: f^2 < 2^46, so the shift stays below i128's range.
-    let factor = ((i128::from(f2) << 30) / i128::from((f2 + rho2).max(1))) as i64;
+    let factor = nearness(optics.focal, rho);
     let offset = i64::from(optics.disparity_offset);
     BallDepth { disparity: saturate((((matched + offset) * factor + (1 << 29)) >> 30) - offset), weight }
+}
+
+/// f^2 / (f^2 + rho^2) in 1/2^30, rounded down; 0 where both are 0.
+fn nearness(focal: i32, rho: i32) -> i64 {
+    let (f2, rho2) = (u64::from(focal.unsigned_abs()).pow(2), u64::from(rho.unsigned_abs()).pow(2));
+    // In two steps of 15 bits, which f < 2^23 and rho < 2^22 keep in 64: 128 are divided bit by bit.
+    let whole = (f2 + rho2).max(1);
+    let (high, rest) = ((f2 << 15) / whole, (f2 << 15) % whole);
+    (high << 15 | (rest << 15) / whole).cast_signed()
 }
 
 #[cfg(test)]

@@ -36,25 +36,13 @@ pub struct Parabola {
     apex: u16,
     /// First position at which no other parabola is lower, px.
     from: u16,
-    /// Square of the distance along the column there, px^2.
-    least: u32,
+    /// Its value at position 0, px^2: the squares of `apex` and of the distance along the column there.
+    base: u32,
 }
 
 impl Parabola {
     /// A value to fill scratch memory with.
-    pub const NONE: Self = Self { apex: 0, from: 0, least: 0 };
-
-    /// Its value at a position, px^2; below 2^25.
-    const fn at(self, x: u16) -> u32 {
-        (self.apex.abs_diff(x) as u32).pow(2) + self.least
-    }
-
-    /// The last position at which it is not above `other`, whose apex lies further right; at most 2^16 - 2.
-    fn last_before(self, other: Self) -> u16 {
-        let base = |p: Self| u32::from(p.apex).pow(2) + p.least;
-        let last = base(other).saturating_sub(base(self)) / (2 * u32::from(other.apex - self.apex));
-        last.min(u32::from(u16::MAX) - 1) as u16
-    }
+    pub const NONE: Self = Self { apex: 0, from: 0, base: 0 };
 }
 
 /// Parabolas of scratch for an image of this width.
@@ -194,11 +182,18 @@ fn along_columns<'p>(bitmap: &Bitmap<'_>, data: &'p mut [u16]) -> Result<Plane<'
 /// the squared distance of every pixel.
 fn along_run(run: &mut [u16], envelope: &mut [Parabola], mut emit: impl FnMut(usize, &mut u16, u32)) {
     let top = lower_envelope(run, envelope);
-    let mut until = run.len() as u16;
+    let mut until = run.len();
     for part in envelope[..=top].iter().rev() {
-        let from = part.from.max(1);
-        for x in from..=until {
-            emit(usize::from(x) - 1, &mut run[usize::from(x) - 1], part.at(x));
+        let from = usize::from(part.from).max(1);
+        // From one position to the next a parabola grows by 2 more than before.
+        let (apex, x) = (u32::from(part.apex), from as u32);
+        let mut square = (x * x + part.base).wrapping_sub(2 * apex * x);
+        let mut growth = (2 * x + 1).wrapping_sub(2 * apex);
+        let pixels = run.get_mut(from - 1..until).unwrap_or_default();
+        for (k, pixel) in (from - 1..).zip(pixels) {
+            emit(k, pixel, square);
+            square = square.wrapping_add(growth);
+            growth = growth.wrapping_add(2);
         }
         until = from - 1;
     }
@@ -209,23 +204,27 @@ fn along_run(run: &mut [u16], envelope: &mut [Parabola], mut emit: impl FnMut(us
 fn lower_envelope(run: &[u16], envelope: &mut [Parabola]) -> usize {
     // The clear pixel before the run is 0 at position 0: nothing ever removes it.
     envelope[0] = Parabola::NONE;
-    let mut top = 0;
+    let (mut top, mut last) = (0, Parabola::NONE);
     let end = run.len() as u32 + 1;
     for (x, &height) in (1..).zip(run.iter().chain(&[0])) {
         let least = u32::from(height).pow(2);
         if least != 0 && least >= x * (end - x) {
             continue;
         }
-        let mut next = Parabola { apex: x as u16, from: 0, least };
-        let mut last = envelope[top];
-        while top > 0 && last.at(last.from) > next.at(last.from) {
+        let base = x * x + least;
+        // At position y they differ by the difference of their bases, less 2 y for each px between their apexes.
+        let mut apart = 2 * (x - u32::from(last.apex));
+        while top > 0 && last.base + u32::from(last.from) * apart > base {
             top -= 1;
             last = envelope[top];
+            apart = 2 * (x - u32::from(last.apex));
         }
-        next.from = last.last_before(next) + 1;
-        if usize::from(next.from) <= run.len() {
+        // The last position at which the one before is not above this one.
+        let before = base.saturating_sub(last.base) / apart;
+        if before < run.len() as u32 {
             top += 1;
-            envelope[top] = next;
+            last = Parabola { apex: x as u16, from: before as u16 + 1, base };
+            envelope[top] = last;
         }
     }
     top

@@ -52,7 +52,7 @@ impl Placed for ContourPoint {
 const SLACK: i32 = PX * 2 / 5;
 
 /// A point that is less high above the tangent does not lie deep, see [`is_empty`].
-const LEAST_HEIGHT: i64 = SLACK as i64 / 3;
+const LEAST_HEIGHT: i32 = SLACK / 3;
 
 /// The medial balls of a contour, in the order of the points that they grow from.
 ///
@@ -72,18 +72,17 @@ pub fn medial_balls(
         near = grown.contact;
         if is_empty(points, &strips, &grown, &inside) {
             let contacts = [i as u32, grown.contact as u32];
-            push(
-                balls,
-                MedialBall { centre: grown.centre(), rho: grown.rho as i32, contacts },
-                "medial balls",
-            )?;
+            push(balls, MedialBall { centre: grown.centre(), rho: grown.rho, contacts }, "medial balls")?;
         }
     }
     Ok(())
 }
 
+/// So many points of the contour are tried where the neighbour's contact is none.
+const TRIED: usize = 16;
+
 /// The radius of a disc that nothing has stopped yet, 1/256 px.
-const UNLIMITED: i64 = (i32::MAX >> 4) as i64;
+const UNLIMITED: i32 = i32::MAX >> 4;
 
 /// A disc that touches a contour point from inside.
 #[derive(Clone, Copy)]
@@ -92,9 +91,9 @@ struct Touching {
     inward: Direction,
     /// Squared length of `inward`, 1/2^28, and the length, 1/16384: (x^2 + 1) / 2, no less than x and hardly more.
     squared: u32,
-    length: i64,
-    /// Radius, 1/256 px.
-    rho: i64,
+    length: i32,
+    /// Radius, 1/256 px; at most [`UNLIMITED`].
+    rho: i32,
     /// The point that it was last shrunk to; its own point before.
     contact: usize,
 }
@@ -106,49 +105,54 @@ enum Sight {
     /// It lies inside, more than 60 degrees from the normal.
     Aside,
     /// It shrinks the disc to this radius.
-    Shrinks(i64),
+    Shrinks(i32),
     /// It would, were the disc larger than this: at twice the radius, where rounding makes inside and outside.
-    Beyond(i64),
+    Beyond(i32),
 }
 
 impl Touching {
     fn sight(&self, q: PixelPoint) -> Sight {
-        let height = i64::from(self.inward.along(self.at, q));
+        let height = self.inward.along(self.at, q);
         if height <= 0 {
             return Sight::Outside;
         }
         let distance_squared = self.at.distance_squared(q);
-        let is_aside = 4 * height * height < distance_squared;
-        if is_aside && height < LEAST_HEIGHT || distance_squared >= 2 * self.rho * height {
+        let is_aside = 4 * product(height, height) < distance_squared;
+        if is_aside && height < LEAST_HEIGHT || distance_squared >= product(2 * self.rho, height) {
             Sight::Outside
         } else if is_aside {
             Sight::Aside
         } else if height >= 2 * self.rho {
             Sight::Beyond(height / 2)
         } else {
-            Sight::Shrinks(div_floor(distance_squared as u64, 2 * height as u64) as i64)
+            // Less than the radius, since the disc reaches over the point.
+            Sight::Shrinks(div_floor(distance_squared as u64, 2 * height as u64) as i32)
         }
     }
 
     /// Make it as small as a point allows that shrinks it, but for one unit: the disc searched for is smaller, and
-    /// the point shrinks this one still.
-    fn narrow(&mut self, q: PixelPoint) {
-        if let Sight::Shrinks(rho) = self.sight(q) {
-            self.rho = rho.max(i64::from(self.inward.along(self.at, q)) / 2) + 1;
-        }
+    /// the point shrinks this one still. Whether it does.
+    fn narrow(&mut self, q: PixelPoint) -> bool {
+        let Sight::Shrinks(rho) = self.sight(q) else { return false };
+        self.rho = rho.max(self.inward.along(self.at, q) / 2) + 1;
+        true
     }
 
     fn centre(&self) -> PixelPoint {
-        let offset = |n: i16| ((self.rho * i64::from(n) + (1 << 13)) >> 14) as i32;
+        let offset = |n: i16| ((product(self.rho, n.into()) + (1 << 13)) >> 14) as i32;
         PixelPoint { u: self.at.u + offset(self.inward.u), v: self.at.v + offset(self.inward.v) }
     }
 
     /// Every point that is not outside lies in here: |q - p|^2 < 2 rho n . (q - p) is a disc about p + rho n
     /// of radius rho |n|; two units more are for rounding.
     fn disc(&self) -> Disc {
-        let radius = ((self.rho * self.length) >> 14) + 2;
-        Disc { centre: self.centre(), squared: radius * radius }
+        let radius = (product(self.rho, self.length) >> 14) as i32 + 2;
+        Disc { centre: self.centre(), radius }
     }
+}
+
+fn product(a: i32, b: i32) -> i64 {
+    i64::from(a) * i64::from(b)
 }
 
 /// The largest disc that touches point `i` from inside and no point within 60 degrees of its normal; the
@@ -162,15 +166,21 @@ fn grow(
     let (at, inward) = (points[i].at, points[i].normal.reversed());
     let (u, v) = (i32::from(inward.u), i32::from(inward.v));
     let squared = (u * u + v * v).cast_unsigned();
-    let length = i64::from((squared >> 14) + UNIT as u32) / 2 + 1;
+    let length = ((squared >> 14).cast_signed() + UNIT) / 2 + 1;
     let mut start = Touching { at, inward, squared, length, rho: UNLIMITED, contact: i };
     for q in &points[near.saturating_sub(1)..points.len().min(near + 2)] {
         start.narrow(q.at);
     }
     if start.rho == UNLIMITED {
-        strips.walk(start.disc(), |_, q, disc| {
+        for q in points.iter().step_by(points.len().div_ceil(TRIED)) {
             start.narrow(q.at);
-            *disc = start.disc();
+        }
+    }
+    if start.rho == UNLIMITED {
+        strips.walk(start.disc(), |_, q, disc| {
+            if start.narrow(q.at) {
+                *disc = start.disc();
+            }
         });
         if start.rho == UNLIMITED {
             return Ok(None);
@@ -187,7 +197,7 @@ fn grow(
             }
             Sight::Beyond(rho) if grown.contact == i => {
                 larger = Some(rho + 1);
-                disc.squared = 0;
+                disc.radius = 0;
             }
             Sight::Aside | Sight::Beyond(_) => full = inside.push(j as u32).and(full),
         });
@@ -206,16 +216,17 @@ fn is_empty(
     grown: &Touching,
     inside: &[u32],
 ) -> bool {
-    let (centre, least) = (grown.centre(), (grown.rho - i64::from(SLACK)).max(0).pow(2));
+    let (centre, radius) = (grown.centre(), (grown.rho - SLACK).max(0));
     // With S the slack and x the normal's length, let rho (1 - x^2) be at most S / 2, which it always is of rounded
     // normals. Then whatever lies deep was seen inside, and is LEAST_HEIGHT high: the disc of radius rho - S begins
     // x (S - rho (1 - x)) > S / 2 above the tangent, and heights are cut by less than 1, which
     // rho^2 (1 - x^2) + (S - 1)^2 < 2 rho (S - 2) allows for.
-    if grown.rho * ((1 << 28) - i64::from(grown.squared)) <= i64::from(SLACK / 2) << 28 {
+    if i64::from(grown.rho) * ((1 << 28) - i64::from(grown.squared)) <= i64::from(SLACK / 2) << 28 {
+        let least = product(radius, radius);
         return inside.iter().all(|&j| centre.distance_squared(points[j as usize].at) >= least);
     }
     let mut empty = true;
-    strips.walk(Disc { centre, squared: least }, |_, _, _| empty = false);
+    strips.walk(Disc { centre, radius }, |_, _, _| empty = false);
     empty
 }
 

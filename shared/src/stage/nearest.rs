@@ -6,6 +6,7 @@
 //! * **Cost**: linear in the number of points, where neighbours in a list are neighbours in the plane.
 
 use crate::arena::Arena;
+use crate::fixed::isqrt;
 use crate::limits::{CapacityError, push};
 use crate::point::PixelPoint;
 use crate::stage::plane::AffineMap;
@@ -41,9 +42,13 @@ pub fn pair_nearest<R: Iterator<Item = PixelPoint>>(
     for left in left {
         // The last partner is near this one; one just as far away may come before it.
         let centre = map.apply(left);
-        let squared = centre.distance_squared(*nearest) + 1;
-        strips.walk(Disc { centre, squared }, |_, right, disc| {
-            (nearest, disc.squared) = (right, centre.distance_squared(*right));
+        let mut least = centre.distance_squared(*nearest) + 1;
+        let disc = |squared: i64| Disc { centre, radius: isqrt(squared.cast_unsigned()) as i32 + 1 };
+        strips.walk(disc(least), |_, right, within| {
+            let squared = centre.distance_squared(*right);
+            if squared < least {
+                (least, nearest, *within) = (squared, right, disc(squared));
+            }
         });
         push(pairs, Pair { left, right: *nearest }, "pairs")?;
     }

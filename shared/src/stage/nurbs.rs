@@ -131,7 +131,7 @@ impl<'a> Nurbs<'a> {
         for (k, value) in basis.into_iter().enumerate() {
             let control = self.controls[(first + k) % self.controls.len()];
             // At most 2^30 x 2^20 / 2^16; times a coordinate below 2^54.
-            let weight = (value * control.weight.clamp(1, 16 * ONE) as i64) >> 16;
+            let weight = (value as i64 * control.weight.clamp(1, 16 * ONE) as i64) >> 16;
             share += weight;
             for (sum, channel) in sums.iter_mut().zip(control.ball.bounded()) {
                 *sum += weight * channel;
@@ -234,26 +234,33 @@ fn accumulate(
     sides.fill([0; 4]);
     let mut cursor = Cursor { segment: 0, start: 0, across: line.chord(0) };
     let samples = if closed { pieces } else { pieces + 1 };
+    // Samples of one span go to the same entries, which gather them first.
+    let mut gathered = Span::default();
     for i in 0..samples {
         let (channels, weight) = line.at(part(line.length, i, pieces), &mut cursor);
         let is_end = !closed && (i == 0 || i == pieces);
         let weight = if is_end { weight * end_weight } else { weight };
         let t = div_round(((spans as i64) << 16) * i, pieces) as i32;
         let (first, basis) = basis(spans, closed, t);
+        if first != gathered.first {
+            gathered.give(matrix, sides);
+            gathered = Span { first, ..Span::default() };
+        }
+        let mut entries = gathered.entries.iter_mut();
         for a in 0..=DEGREE {
-            for b in 0..=a {
-                let product = (basis[a] * basis[b]) >> BASIS_BITS;
-                matrix.add((first + a) % count, (first + b) % count, (product * weight) >> 16);
+            for (b, entry) in (0..=a).zip(&mut entries) {
+                let product = (i64::from(basis[a]) * i64::from(basis[b])) >> BASIS_BITS;
+                *entry += (product * weight) >> 16;
             }
             // Below 2^37, times a difference of channels below 2^26.
-            let weighted = (basis[a] * weight) >> 16;
-            let side = &mut sides[(first + a) % count];
+            let weighted = (i64::from(basis[a]) * weight) >> 16;
             for c in 0..4 {
                 let term = weighted * (channels[c] - (origin[c] << FINE_BITS));
-                side[c] += (term + (1 << (drop - 1))) >> drop;
+                gathered.sides[a][c] += (term + (1 << (drop - 1))) >> drop;
             }
         }
     }
+    gathered.give(matrix, sides);
     let penalty = smoothing << (BASIS_BITS - 16);
     for k in 0..if closed { count } else { count - 2 } {
         let stencil = [(k, 1), ((k + 1) % count, -2), ((k + 2) % count, 1)];
@@ -268,6 +275,31 @@ fn accumulate(
     matrix.solve(sides);
 }
 
+/// What the samples of a span add to the normal equations.
+#[derive(Default)]
+struct Span {
+    /// The first of its control points.
+    first: usize,
+    /// Those of the lower half of its square of the matrix, row after row.
+    entries: [i64; (DEGREE + 1) * (DEGREE + 2) / 2],
+    sides: [[i64; 4]; DEGREE + 1],
+}
+
+impl Span {
+    fn give(&self, matrix: &mut Envelope<'_>, sides: &mut [[i64; 4]]) {
+        let mut entries = self.entries.iter();
+        for a in 0..=DEGREE {
+            let row = (self.first + a) % sides.len();
+            for (b, entry) in (0..=a).zip(&mut entries) {
+                matrix.add(row, (self.first + b) % sides.len(), *entry);
+            }
+            for (side, sum) in sides[row].iter_mut().zip(self.sides[a]) {
+                *side += sum;
+            }
+        }
+    }
+}
+
 /// Spans of a curve with so many control points.
 const fn span_count(controls: usize, closed: bool) -> usize {
     if closed { controls } else { controls - DEGREE }
@@ -275,7 +307,7 @@ const fn span_count(controls: usize, closed: bool) -> usize {
 
 /// The four basis functions that are not 0 at `t` (1/65536 span), in 1/2^30, and the index of the first
 /// (Cox and de Boor; The NURBS Book, A2.2). They add up to exactly 1.
-fn basis(spans: usize, closed: bool, t: i32) -> (usize, [i64; 4]) {
+fn basis(spans: usize, closed: bool, t: i32) -> (usize, [i32; 4]) {
     let span = (t >> 16).clamp(0, spans as i32 - 1);
     let knot = |offset: i32| {
         let knot = span + offset;
@@ -290,7 +322,7 @@ fn basis(spans: usize, closed: bool, t: i32) -> (usize, [i64; 4]) {
             // value (t - left) / (right - left), rounded: the shift leaves 32 bits, since the function is at most
             // 2^30 and t at most 1 to 3 spans from the left.
             let part = *value as u64 * (t - (left << 16)) as u64 + (u64::from(spans) << 15);
-            let rising = i64::from((part >> 16) as u32 / spans);
+            let rising = ((part >> 16) as u32 / spans).cast_signed();
             *value += carried - rising;
             carried = rising;
         }

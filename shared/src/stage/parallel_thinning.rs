@@ -191,6 +191,7 @@ impl Cut {
     }
 
     /// Cut the bitmap.
+    #[inline(always)]
     fn read(&self, bitmap: &Bitmap<'_>, rows: &mut [Word]) {
         rows.fill(0);
         for v in 0..self.height {
@@ -207,6 +208,7 @@ impl Cut {
     }
 
     /// Put the strips together again.
+    #[inline(always)]
     fn write(&self, rows: &[Word], bitmap: &mut Bitmap<'_>) {
         for v in 0..self.height {
             let row = bitmap.row_mut((self.top + v) as i32);
@@ -214,6 +216,10 @@ impl Cut {
             for (c, strip) in rows.chunks_exact(self.stride()).enumerate() {
                 let (i, bit) = self.place(c);
                 let own = (strip[1 + v] & OWN) >> 1;
+                // Of most words nothing is left.
+                if own == 0 {
+                    continue;
+                }
                 row[i] |= own << bit;
                 if let Some(next) = row.get_mut(i + 1) {
                     *next |= own >> 1 >> (WORD_BITS - 1 - bit);

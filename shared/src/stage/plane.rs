@@ -79,32 +79,9 @@ impl ImagePlane {
 
     /// Weighted least squares with the ridge.
     fn fit_once(observations: impl Iterator<Item = Observation>) -> Option<Self> {
-        let sums = observations.fold(Sums::default(), Sums::with);
-        let total = sums.weight;
-        if total <= 0 {
-            return None;
-        }
-        let mean = |sum: i64| (sum / total) as i32;
-        let (origin, level) = (PixelPoint { u: mean(sums.u), v: mean(sums.v) }, mean(sums.d));
-        let [weight, mean_u, mean_v, mean_d] =
-            [total, origin.u.into(), origin.v.into(), level.into()].map(i128::from);
-        // sum w (x - m) (y - n) = sum w x y - m sum w y - n sum w x + m n sum w, whatever m and n are.
-        let centred = |xy: i128, (x, m): (i64, i128), (y, n): (i64, i128)| {
-            xy - m * i128::from(y) - n * i128::from(x) + m * n * weight
-        };
-        let (u, v, d) = ((sums.u, mean_u), (sums.v, mean_v), (sums.d, mean_d));
-        let ridge = weight * PX2;
-        let (uu, vv) = (centred(sums.uu, u, u) + ridge, centred(sums.vv, v, v) + ridge);
-        let (uv, ud, vd) = (centred(sums.uv, u, v), centred(sums.ud, u, d), centred(sums.vd, v, d));
-        // Sums reach 2^72; 40 bits are plenty for a slope, and keep the products below within i128.
-        let excess = (128 - uu.max(vv).leading_zeros()).saturating_sub(40);
-        let [uu, vv, uv, ud, vd] = [uu, vv, uv, ud, vd].map(|s| s >> excess);
-        let determinant = uu * vv - uv * uv;
-        if determinant <= 0 {
-            return Some(Self { origin, level, ..Self::default() });
-        }
-        let slope = |n: i128| ((n << 16) / determinant).clamp(-(1 << 24), 1 << 24) as i32;
-        Some(Self { origin, level, slope_u: slope(ud * vv - vd * uv), slope_v: slope(vd * uu - ud * uv) })
+        let mut sums = Sums::default();
+        observations.for_each(|o| sums.add(o));
+        sums.plane()
     }
 }
 
@@ -122,22 +99,57 @@ struct Sums {
     vd: i128,
 }
 
+/// Neither is copied into each of the many callers that iterators make: an image of the firmware would be 20 kB larger.
 impl Sums {
-    /// With one more; each of its terms is below 2^56.
-    fn with(self, o: Observation) -> Self {
+    /// One more; each of its terms is below 2^56.
+    #[inline(never)]
+    fn add(&mut self, o: Observation) {
         let [w, u, v, d] = [o.weight, o.at.u, o.at.v, o.value].map(i64::from);
         let (wu, wv) = (w * u, w * v);
-        Self {
-            weight: self.weight + w,
-            u: self.u + wu,
-            v: self.v + wv,
-            d: self.d + w * d,
-            uu: self.uu + i128::from(wu * u),
-            vv: self.vv + i128::from(wv * v),
-            uv: self.uv + i128::from(wu * v),
-            ud: self.ud + i128::from(wu * d),
-            vd: self.vd + i128::from(wv * d),
+        self.weight += w;
+        self.u += wu;
+        self.v += wv;
+        self.d += w * d;
+        self.uu += i128::from(wu * u);
+        self.vv += i128::from(wv * v);
+        self.uv += i128::from(wu * v);
+        self.ud += i128::from(wu * d);
+        self.vd += i128::from(wv * d);
+    }
+
+    /// The plane that fits what was added, or `None` without a positive weight.
+    #[inline(never)]
+    fn plane(&self) -> Option<ImagePlane> {
+        let total = self.weight;
+        if total <= 0 {
+            return None;
         }
+        let mean = |sum: i64| (sum / total) as i32;
+        let (origin, level) = (PixelPoint { u: mean(self.u), v: mean(self.v) }, mean(self.d));
+        let [weight, mean_u, mean_v, mean_d] =
+            [total, origin.u.into(), origin.v.into(), level.into()].map(i128::from);
+        // sum w (x - m) (y - n) = sum w x y - m sum w y - n sum w x + m n sum w, whatever m and n are.
+        let centred = |xy: i128, (x, m): (i64, i128), (y, n): (i64, i128)| {
+            xy - m * i128::from(y) - n * i128::from(x) + m * n * weight
+        };
+        let (u, v, d) = ((self.u, mean_u), (self.v, mean_v), (self.d, mean_d));
+        let ridge = weight * PX2;
+        let (uu, vv) = (centred(self.uu, u, u) + ridge, centred(self.vv, v, v) + ridge);
+        let (uv, ud, vd) = (centred(self.uv, u, v), centred(self.ud, u, d), centred(self.vd, v, d));
+        // Sums reach 2^72; 40 bits are plenty for a slope, and keep the products below within i128.
+        let excess = (128 - uu.max(vv).leading_zeros()).saturating_sub(40);
+        let [uu, vv, uv, ud, vd] = [uu, vv, uv, ud, vd].map(|s| s >> excess);
+        let determinant = uu * vv - uv * uv;
+        if determinant <= 0 {
+            return Some(ImagePlane { origin, level, ..ImagePlane::default() });
+        }
+        let slope = |n: i128| ((n << 16) / determinant).clamp(-(1 << 24), 1 << 24) as i32;
+        Some(ImagePlane {
+            origin,
+            level,
+            slope_u: slope(ud * vv - vd * uv),
+            slope_v: slope(vd * uu - ud * uv),
+        })
     }
 }
 
@@ -164,7 +176,8 @@ impl AffineMap {
         Some(Self { u: observe(|p| p.u)?, v: observe(|p| p.v)? })
     }
 
-    /// Where a point goes.
+    /// Where a point goes. A map that was fitted takes |u|, |v| < 2^20 below 2^30 + 2^21: its slopes are at most 256,
+    /// and no point lies more than 2^21 from the origin.
     pub const fn apply(&self, p: PixelPoint) -> PixelPoint {
         PixelPoint { u: self.u.at(p), v: self.v.at(p) }
     }

@@ -54,10 +54,9 @@ const ANCHOR_SLOPE: u32 = 128 * 128 * 49 / 100;
 const STEEP: u32 = 90;
 const _: () = assert!(STEEP * STEEP > ANCHOR_SLOPE);
 
-/// Marks an anchor in the list of pixels, above 12 bits of row and 12 of column.
+/// Marks an anchor in the list of pixels, above the pixel's place in the bitmap.
 const ANCHOR: u32 = 1 << 31;
-const COLUMN_BITS: u32 = 12;
-const _: () = assert!(MAX_SIDE <= 1 << COLUMN_BITS);
+const _: () = assert!(MAX_SIDE.next_multiple_of(WORD_BITS) * MAX_SIDE <= ANCHOR as usize);
 
 /// Delete simple pixels in the order of (distance, row, column), except anchors, in sweeps until one
 /// deletes nothing; then, in one sweep of the same order, all simple pixels but end points.
@@ -92,12 +91,7 @@ pub fn thin(
 }
 
 fn delete_if(bitmap: &mut Bitmap<'_>, entry: u32, decide: impl Fn(u8) -> bool) -> bool {
-    let (u, v) = (entry & ((1 << COLUMN_BITS) - 1), (entry & !ANCHOR) >> COLUMN_BITS);
-    let deleted = decide(bitmap.neighbours(u as i32, v as i32));
-    if deleted {
-        bitmap.put(u as usize, v as usize, false);
-    }
-    deleted
+    bitmap.clear_if((entry & !ANCHOR) as usize, decide)
 }
 
 /// Simple, and not an end point.
@@ -111,18 +105,15 @@ fn sort_by_distance<'o>(
     distance: &Plane<'_, u16>,
     mut scratch: Arena<'o>,
 ) -> Result<&'o mut [u32], CapacityError> {
-    let values = |(v, run): (usize, Range<usize>)| {
-        let row = distance.row(v);
-        run.map(|u| value(row, u)).fold(0, u16::max)
-    };
-    let largest = object_runs(bitmap).map(values).max().unwrap_or(0);
+    let values = |(v, run): (usize, Range<usize>)| distance.row(v).get(run).unwrap_or_default();
+    let greatest = |values: &[u16]| values.iter().copied().fold(0, u16::max);
+    let largest = object_runs(bitmap).map(values).map(greatest).max().unwrap_or(0);
     let set = bitmap.count();
     let order = scratch.take::<u32>(scratch_order(set, largest), "entries of the thinning order")?;
     let (list, next) = order.split_at_mut(set);
     next.fill(0);
-    for (v, run) in object_runs(bitmap) {
-        let row = distance.row(v);
-        run.for_each(|u| next[usize::from(value(row, u))] += 1);
+    for values in object_runs(bitmap).map(values) {
+        values.iter().for_each(|d| next[usize::from(*d)] += 1);
     }
     let mut start = 0;
     for entry in next.iter_mut() {
@@ -130,12 +121,15 @@ fn sort_by_distance<'o>(
     }
     for (v, run) in object_runs(bitmap) {
         let rows = [v.wrapping_sub(1), v, v + 1].map(|v| distance.row(v));
+        let mut west = Column::of(rows, run.start.wrapping_sub(1));
+        let mut here = Column::of(rows, run.start);
         for u in run {
-            let d = value(rows[1], u);
-            let place = &mut next[usize::from(d)];
-            let mark = if d > ANCHOR_DISTANCE && is_anchor(rows, u) { ANCHOR } else { 0 };
-            list[*place as usize] = mark | (v as u32) << COLUMN_BITS | u as u32;
+            let east = Column::of(rows, u + 1);
+            let mark = if here.middle > ANCHOR_DISTANCE && is_flat(&west, &here, &east) { ANCHOR } else { 0 };
+            let place = &mut next[usize::from(here.middle)];
+            list[*place as usize] = mark | bitmap.place(u, v) as u32;
             *place += 1;
+            (west, here) = (here, east);
         }
     }
     Ok(list)
@@ -152,18 +146,28 @@ fn value(row: &[u16], u: usize) -> u16 {
     row.get(u).copied().unwrap_or(0)
 }
 
-/// Whether the distance is flat in a column of the middle one of three rows, by Sobel's sums.
-fn is_anchor(rows: [&[u16]; 3], u: usize) -> bool {
-    let [[nw, n, ne], [w, _, e], [sw, s, se]] = rows.map(|row| match row.get(u.wrapping_sub(1)..u + 2) {
-        Some(&[west, here, east]) => [west, here, east].map(i32::from),
-        _ => [u.wrapping_sub(1), u, u + 1].map(|u| i32::from(value(row, u))),
-    });
-    let gx = (ne + 2 * e + se - nw - 2 * w - sw).unsigned_abs();
-    if gx >= STEEP {
-        return false;
+/// Three distances, one above the other, as Sobel's sums take them.
+struct Column {
+    middle: u16,
+    /// The upper one, twice the middle one and the lower one.
+    sum: i32,
+    /// The lower one less the upper one.
+    drop: i32,
+}
+
+impl Column {
+    fn of([above, here, below]: [&[u16]; 3], u: usize) -> Self {
+        let (upper, middle, lower) = (value(above, u), value(here, u), value(below, u));
+        let (n, c, s) = (i32::from(upper), i32::from(middle), i32::from(lower));
+        Self { middle, sum: n + 2 * c + s, drop: s - n }
     }
-    let gy = (sw + 2 * s + se - nw - 2 * n - ne).unsigned_abs();
-    gy < STEEP && gx * gx + gy * gy <= ANCHOR_SLOPE
+}
+
+/// Whether the distance has hardly a slope in the middle one of three columns.
+fn is_flat(west: &Column, here: &Column, east: &Column) -> bool {
+    let gx = (east.sum - west.sum).unsigned_abs();
+    let gy = (west.drop + 2 * here.drop + east.drop).unsigned_abs();
+    gx < STEEP && gy < STEEP && gx * gx + gy * gy <= ANCHOR_SLOPE
 }
 
 /// Delete, in one sweep in raster order, the simple pixels with two or more neighbours: what remains of a
@@ -175,10 +179,7 @@ pub fn minimal(bitmap: &mut Bitmap<'_>) -> u32 {
         for i in 0..size.row_words() {
             // No later pixel of the word is deleted before its turn.
             for u in SetBits(bitmap.row(v as i32)[i]).map(|bit| i * WORD_BITS + bit) {
-                if is_removable(bitmap.neighbours(u as i32, v as i32)) {
-                    bitmap.put(u, v, false);
-                    deleted += 1;
-                }
+                deleted += u32::from(bitmap.clear_if(bitmap.place(u, v), is_removable));
             }
         }
     }
