@@ -136,6 +136,8 @@ part_firmware() {
         check cargo clippy -q -p firmware --target "$TARGET" --release --locked --no-default-features \
             --features "$features" -- -D warnings
     done
+    # The core in a firmware of one's own.
+    check cargo clippy -q -p shared --example sketch --target "$TARGET" --release --locked -- -D warnings
     # As the user builds it, and what it takes.
     check cargo build -q -p firmware --target "$TARGET" --release --locked
     tests cargo test -q --locked -p system-tests --test footprint -- --nocapture

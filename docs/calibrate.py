@@ -4,7 +4,8 @@
     pip install opencv-python-headless
     python3 docs/calibrate.py FOLDER COLUMNSxROWS SQUARE_MM [calib.yaml]
 
-FOLDER holds left_*.png and right_*.png, as `host capture --record FOLDER --only-record` leaves them.
+FOLDER holds left_*.png and right_*.png, as `host capture --record FOLDER --only-record` leaves them, or folders with
+left.png and right.png, as `host device grab` does.
 COLUMNSxROWS counts inner corners, where four squares meet: 9x6 for a board of ten by seven squares; one
 number even, one odd, so that the board has a top. Writes what `host ... --calib` reads. docs/calibration.md
 says how to hold the board.
@@ -34,7 +35,7 @@ def main(folder, board, square_mm, out="calib.yaml"):
     grid = np.zeros((board[0] * board[1], 3), np.float32)
     grid[:, :2] = np.mgrid[: board[0], : board[1]].T.reshape(-1, 2) * float(square_mm)
 
-    lefts = sorted(Path(folder).glob("left_*.png"))
+    lefts = sorted(Path(folder).rglob("left*.png"))
     lefts = lefts[:: max(1, -(-len(lefts) // MOST_PAIRS))]
     views, size = [], None
     for left in lefts:

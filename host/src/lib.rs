@@ -1,6 +1,26 @@
 //! Ossature on a PC, in the order in which data flows: a source gives a stereo pair, the calibration
 //! says what its pixels mean, the core of `shared` describes and matches it, the stages here grow the
 //! solid, and exports and reports write it down.
+//!
+//! Lengths are millimetres in the left camera's axes (x right, y down, z forward), images 8-bit grey, pixel centres at
+//! whole numbers. A pair to a mesh in a file:
+//!
+//! ```no_run
+//! use host::calibration::StereoCamera;
+//! use host::geometry::Geometry;
+//! use host::reconstruct::{Options, reconstruct};
+//! use host::source::picture::load_view;
+//! use std::path::Path;
+//!
+//! let [left, right] = ["left.png", "right.png"].map(|name| load_view(Path::new(name)));
+//! let camera = StereoCamera::read("calib.yaml")?;
+//! let model = reconstruct(left?.image, right?.image, &camera, &Options::default(), &mut ())?;
+//! host::export::write(Path::new("model.stl"), &Geometry::Mesh(model.mesh))?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! A pair that is not to be trusted is a [`Refusal`](reconstruct::Refusal), whose sentence says what to do. For many pairs,
+//! [`Workspace`](reconstruct::Workspace) does the same without allocating anew. `host/examples/` has both as programs.
 
 // What goes in.
 pub mod source;

@@ -66,7 +66,7 @@ pub enum Refusal {
     #[error(transparent)]
     Calibration(#[from] crate::calibration::CalibrationError),
     /// The core refuses the pair.
-    #[error("{}", crate::report::words::sentence(.0))]
+    #[error("{} (docs/gates/{}.md)", crate::report::words::sentence(.0), crate::report::words::name(.0))]
     Gate(Finding),
     /// The balls give no surface.
     #[error(transparent)]

@@ -40,6 +40,9 @@ pub struct Size {
 
 impl Size {
     /// A size, if both sides are at most [`MAX_SIDE`].
+    ///
+    /// # Errors
+    /// A [`CapacityError`] when a side is longer.
     pub const fn new(width: usize, height: usize) -> Result<Self, CapacityError> {
         if width > MAX_SIDE || height > MAX_SIDE {
             return Err(CapacityError { what: "pixels on a side", limit: MAX_SIDE });
@@ -88,6 +91,9 @@ pub struct Bitmap<'a> {
 
 impl<'a> Bitmap<'a> {
     /// An empty bitmap in `words`, of which it takes the first [`Size::words`].
+    ///
+    /// # Errors
+    /// A [`CapacityError`] when there are fewer words.
     pub fn new(size: Size, words: &'a mut [Word]) -> Result<Self, CapacityError> {
         let bitmap = Self::over(size, words)?;
         bitmap.words.fill(0);
@@ -96,6 +102,9 @@ impl<'a> Bitmap<'a> {
 
     /// A bitmap over `words` as they stand, of which it takes the first [`Size::words`]: one that an
     /// earlier stage left there.
+    ///
+    /// # Errors
+    /// A [`CapacityError`] when there are fewer words.
     pub fn over(size: Size, words: &'a mut [Word]) -> Result<Self, CapacityError> {
         let limit = words.len();
         let words =
@@ -104,6 +113,9 @@ impl<'a> Bitmap<'a> {
     }
 
     /// A bitmap from a drawing: a line a row, `#` set, anything else clear. For tests and examples.
+    ///
+    /// # Errors
+    /// A [`CapacityError`] when there are fewer words than the drawing needs.
     pub fn from_art(art: &str, words: &'a mut [Word]) -> Result<Self, CapacityError> {
         let rows = || art.lines().map(str::trim).filter(|l| !l.is_empty());
         let width = rows().map(|l| l.chars().count()).max().unwrap_or(0);
@@ -380,6 +392,9 @@ pub struct Plane<'a, T> {
 
 impl<'a, T> Plane<'a, T> {
     /// A plane over `data` as it stands, of which it takes the first [`Size::pixels`].
+    ///
+    /// # Errors
+    /// A [`CapacityError`] when there is less data.
     pub fn over(size: Size, data: &'a mut [T]) -> Result<Self, CapacityError> {
         let limit = data.len();
         let data = data.get_mut(..size.pixels()).ok_or(CapacityError { what: "pixels in a plane", limit })?;
@@ -389,6 +404,9 @@ impl<'a, T> Plane<'a, T> {
 
 impl<'a, T: Copy + Default> Plane<'a, T> {
     /// A plane of default values in `data`, of which it takes the first [`Size::pixels`].
+    ///
+    /// # Errors
+    /// A [`CapacityError`] when there is less data.
     pub fn new(size: Size, data: &'a mut [T]) -> Result<Self, CapacityError> {
         let plane = Self::over(size, data)?;
         plane.data.fill(T::default());
@@ -434,6 +452,9 @@ pub struct Grey<'a> {
 
 impl<'a> Grey<'a> {
     /// An image whose rows start `stride` bytes apart.
+    ///
+    /// # Errors
+    /// A [`CapacityError`] when the rows overlap or the last one is cut short.
     pub fn new(size: Size, stride: usize, data: &'a [u8]) -> Result<Self, CapacityError> {
         let rows_before_last = stride.saturating_mul(size.height.saturating_sub(1));
         let needed = if size.height == 0 { 0 } else { rows_before_last.saturating_add(size.width) };

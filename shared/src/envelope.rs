@@ -42,6 +42,9 @@ pub struct Envelope<'a> {
 
 impl<'a> Envelope<'a> {
     /// A matrix of zeros, the last three rows full or not.
+    ///
+    /// # Errors
+    /// A [`CapacityError`] when the scratch is too short.
     pub fn new(rows: usize, cyclic: bool, entries: &'a mut [i64]) -> Result<Self, CapacityError> {
         let full = if cyclic { rows.saturating_sub(BAND) } else { rows };
         let limit = entries.len();

@@ -116,7 +116,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 /// The mesh that a name stands for, and where it belongs unless the user says otherwise.
 fn mesh(what: &str, scale: f64) -> Result<(Mesh, Place), Failure> {
     let path = Path::new(what);
-    if path.extension().is_none() && !path.exists() {
+    if path.extension().is_none() && !path.is_file() {
         let shape: Shape = what.parse().map_err(|unknown: UnknownShape| usage(&unknown.to_string()))?;
         return Ok((shape.mesh(shape.cell()), Place::AsIs));
     }

@@ -186,6 +186,9 @@ fn sorted<T: Copy>(a: T, b: T, c: T, order: impl Fn(T, T) -> (T, T)) -> (T, T, T
 
 /// The 3x3 median of an image, by `median_row`, in `buffer`, of which it takes the first width x height
 /// bytes.
+///
+/// # Errors
+/// A [`CapacityError`] when the buffer is shorter than the image.
 pub fn median<'b>(
     grey: Grey<'_>,
     buffer: &'b mut [u8],
@@ -302,6 +305,9 @@ fn above(level: u8) -> impl Fn([u8; BYTES]) -> Word + Copy {
 }
 
 /// The bitmap of an image, in `words`.
+///
+/// # Errors
+/// A [`CapacityError`] when there are fewer words than the bitmap has.
 pub fn binarise<'w>(
     grey: Grey<'_>,
     level: u8,

@@ -33,6 +33,9 @@ pub enum Element {
 const TOGETHER: usize = MAX_SIDE / WORD_BITS;
 
 /// The boundary of a bitmap, in `words`.
+///
+/// # Errors
+/// A [`CapacityError`] when there are fewer words than the bitmap has.
 pub fn boundary<'w>(
     bitmap: &Bitmap<'_>,
     element: Element,

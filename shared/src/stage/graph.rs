@@ -278,6 +278,9 @@ impl Graph<'_> {
 }
 
 /// Make `graph` the graph of `skeleton`. `seen` lends as many words as the skeleton has.
+///
+/// # Errors
+/// A [`CapacityError`] when a list of the graph, or `seen`, is too short.
 pub fn trace(skeleton: &Bitmap<'_>, seen: &mut [Word], graph: &mut Graph<'_>) -> Result<(), CapacityError> {
     let mut seen = Bitmap::new(skeleton.size(), seen)?;
     graph.nodes.clear();

@@ -42,6 +42,9 @@ pub fn bitmap_extents(bitmap: &Bitmap<'_>) -> impl Iterator<Item = RowExtent> {
 ///
 /// While the rows come in, the right chain grows from the start of the list and the left chain from its
 /// end, so that the left one already lies in the order in which it is wanted: from the bottom up.
+///
+/// # Errors
+/// A [`CapacityError`] when `out` is too short.
 pub fn convex_hull(
     extents: impl IntoIterator<Item = RowExtent>,
     out: &mut VecView<PixelPoint>,

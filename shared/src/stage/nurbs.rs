@@ -174,6 +174,9 @@ impl<'a> Nurbs<'a> {
 }
 
 /// Append the control points of the curve along `samples` and return how many there are.
+///
+/// # Errors
+/// A [`CapacityError`] when the scratch or `controls` is too short.
 pub fn fit(
     samples: &[Sample],
     closed: bool,

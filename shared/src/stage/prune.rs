@@ -81,6 +81,9 @@ pub struct Report {
 
 /// Prune `skeleton` by `rule` and make `graph` the graph of what is left. The scratch holds as many words as
 /// the skeleton has, and every end.
+///
+/// # Errors
+/// A [`CapacityError`] when the scratch or a list of the graph is too short.
 pub fn prune(
     skeleton: &mut Bitmap<'_>,
     distance: &Plane<'_, u16>,

@@ -6,6 +6,7 @@ pub mod cases;
 pub mod core;
 pub mod device;
 pub mod emulated;
+pub mod gates;
 pub mod graph;
 pub mod images;
 pub mod kernels;

@@ -1,15 +1,18 @@
 //! The model from three sides beside the photograph, as in the paper's Figure 8.
 
 use super::canvas::{Anchor, Canvas, Letters, Place};
-use super::colour::{FAINT, INK, PAPER};
+use super::colour::{ACCENT, APART, FAINT, GROUND, INK, OBJECT, PAPER, RIM, WHITE, mix};
 use super::panel::{FOOT, GAP, HEAD};
 use crate::mesh::Mesh;
 use crate::render::render_with;
-use crate::report::record::Eye;
+use crate::report::record::{Eye, Parts, Rasters};
+use crate::stage::balls::px2;
 use crate::view::Pinhole;
 use image::imageops::FilterType;
-use image::{DynamicImage, GrayImage, RgbImage};
+use image::{DynamicImage, GrayImage, Rgb, RgbImage};
 use nalgebra::{Matrix3, Point3};
+use shared::bitmap::PixelBox;
+use shared::stage::graph::NodeKind;
 
 /// Side of a view, px.
 pub(super) const SIDE: u32 = 360;
@@ -25,7 +28,7 @@ const VIEWS: [(&str, Matrix3<f64>); 3] = [
     ("top", Matrix3::new(1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0)),
 ];
 
-/// The photograph and the model from front, side and top; below it the truth, if it is known.
+/// The photograph and the model from front, side and top; below them the skeleton and the truth, if that is known.
 pub(super) fn model(eye: &Eye, mesh: &Mesh, truth: Option<&Mesh>) -> Option<RgbImage> {
     let [low, high] = mesh.bounds()?;
     let cube = (nalgebra::center(&low, &high), (high - low).max() / 2.0);
@@ -34,37 +37,79 @@ pub(super) fn model(eye: &Eye, mesh: &Mesh, truth: Option<&Mesh>) -> Option<RgbI
     let mut canvas = Canvas::new(4 * across + GAP, HEAD + rows * down, PAPER);
     let title = Place::new(f64::from(GAP), f64::from(HEAD) / 2.0);
     canvas.text("The model beside the left image", title, Anchor::Left, Letters::Large, INK);
-    let mut put = |picture: &GrayImage, name: &str, column: u32, row: u32| {
+    let mut put = |picture: &RgbImage, name: &str, column: u32, row: u32| {
         let corner = (GAP + column * across, HEAD + row * down);
-        canvas.paste(&DynamicImage::ImageLuma8(picture.clone()).to_rgb8(), corner);
+        canvas.paste(picture, corner);
         let below = (corner.0 + SIDE / 2, corner.1 + SIDE + FOOT / 2);
         let below = Place::new(below.0.into(), below.1.into());
         canvas.text(name, below, Anchor::Centre, Letters::Small, FAINT);
     };
-    put(&photograph(eye)?, "left image", 0, 0);
+    let Rasters { grey, mask, .. } = eye.rasters.as_ref()?;
+    let square = Square::around(&eye.parts.bounds?);
+    put(&coloured(square.cut(grey)), "left image", 0, 0);
+    if truth.is_some() {
+        put(&square.skeleton(mask, &eye.parts), "skeleton", 0, 1);
+    }
     for (row, (what, mesh)) in (0..).zip([("model", Some(mesh)), ("truth", truth)]) {
         for (column, (name, turn)) in (1..).zip(VIEWS) {
             if let Some(picture) = mesh.and_then(|mesh| shaded(mesh, cube, &turn)) {
-                put(&picture, &format!("{what}, {name}"), column, row);
+                put(&coloured(picture), &format!("{what}, {name}"), column, row);
             }
         }
     }
     Some(canvas.finish())
 }
 
-/// The object in the left image, cut out as a square.
-fn photograph(eye: &Eye) -> Option<GrayImage> {
-    let (grey, bounds) = (&eye.rasters.as_ref()?.grey, eye.parts.bounds?);
-    let size = [bounds.max.u - bounds.min.u, bounds.max.v - bounds.min.v].map(|s| u32::from(s) + 1);
-    let side = (f64::from(size[0].max(size[1])) / FILL).ceil() as u32;
-    let first = |low: u16, size: u32| i64::from(low) - i64::from((side - size) / 2);
-    let (u0, v0) = (first(bounds.min.u, size[0]), first(bounds.min.v, size[1]));
-    let square = GrayImage::from_fn(side, side, |x, y| {
-        let inside =
-            |from: i64, by: u32, limit: u32| (from + i64::from(by)).clamp(0, i64::from(limit) - 1) as u32;
-        *grey.get_pixel(inside(u0, x, grey.width()), inside(v0, y, grey.height()))
-    });
-    Some(image::imageops::resize(&square, SIDE, SIDE, FilterType::CatmullRom))
+fn coloured(picture: GrayImage) -> RgbImage {
+    DynamicImage::ImageLuma8(picture).to_rgb8()
+}
+
+/// The square of an image that is shown, px.
+struct Square {
+    first: [i64; 2],
+    side: u32,
+}
+
+impl Square {
+    /// The square around an object's box.
+    fn around(bounds: &PixelBox) -> Self {
+        let size = [bounds.max.u - bounds.min.u, bounds.max.v - bounds.min.v].map(|s| u32::from(s) + 1);
+        let side = (f64::from(size[0].max(size[1])) / FILL).ceil() as u32;
+        let first = |low: u16, size: u32| i64::from(low) - i64::from((side - size) / 2);
+        Self { first: [first(bounds.min.u, size[0]), first(bounds.min.v, size[1])], side }
+    }
+
+    /// What an image has there, as large as a view; beyond its border it goes on as there.
+    fn cut(&self, image: &GrayImage) -> GrayImage {
+        let square = GrayImage::from_fn(self.side, self.side, |x, y| {
+            let inside =
+                |from: i64, by: u32, limit: u32| (from + i64::from(by)).clamp(0, i64::from(limit) - 1) as u32;
+            let [u, v] = self.first;
+            *image.get_pixel(inside(u, x, image.width()), inside(v, y, image.height()))
+        });
+        image::imageops::resize(&square, SIDE, SIDE, FilterType::CatmullRom)
+    }
+
+    /// The object's mask, and in it the branches of its pruned skeleton with their nodes.
+    fn skeleton(&self, mask: &GrayImage, parts: &Parts) -> RgbImage {
+        let mask = self.cut(mask);
+        let part = |x, y| f64::from(mask.get_pixel(x, y)[0]) / 255.0;
+        let mut canvas = Canvas::new(SIDE, SIDE, GROUND);
+        canvas.paste(&RgbImage::from_fn(SIDE, SIDE, |x, y| Rgb(mix(GROUND, OBJECT, part(x, y)))), (0, 0));
+        let scale = f64::from(SIDE) / f64::from(self.side);
+        let to = |x: f64, first: i64| (x - first as f64 + 0.5) * scale - 0.5;
+        let at = |u: f64, v: f64| Place::new(to(u, self.first[0]), to(v, self.first[1]));
+        for (k, (edge, pixels)) in parts.edges.iter().enumerate() {
+            let places: Vec<Place> = pixels.iter().map(|p| at(p.u.into(), p.v.into())).collect();
+            canvas.lines(&places, edge.closed, 2.0, APART[k % APART.len()]);
+        }
+        for node in parts.nodes.iter().filter(|node| node.kind != NodeKind::Loop) {
+            let colour = if node.kind == NodeKind::Junction { ACCENT } else { WHITE };
+            let place = px2(node.position);
+            canvas.dot(at(place.x, place.y), 3.0, colour, RIM);
+        }
+        canvas.finish()
+    }
 }
 
 /// A shaded view of a mesh, turned about the middle of the `cube` (centre and half a side, mm) around it.
