@@ -42,6 +42,7 @@ pub mod report;
 pub mod output;
 
 // What the user asks for.
+pub mod config;
 pub mod command;
 
 // What it is compared with: built-in solids, rendered and measured, and simpler methods.

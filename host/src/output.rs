@@ -13,7 +13,8 @@
 //! target and moved only when all of it is complete; when something fails before that, the target is left
 //! as it was. Files are moved one after the other: if the system refuses one of these moves, those before it
 //! are new and the rest old. A page and pictures of an earlier run that this one did not make are removed, so
-//! that a folder speaks of one run; files of other names are not touched.
+//! that a folder speaks of one run, and all of them when a pair is refused (`clear`); files of other names are not
+//! touched.
 
 use crate::export::ExportError;
 use crate::export::ply;
@@ -51,6 +52,27 @@ pub fn write(folder: &Path, run: &Run<'_>, page: bool) -> Result<Vec<u8>, Export
 /// Whether a folder holds what a run left.
 pub(crate) fn is_result(folder: &Path) -> bool {
     ["model.ply", "report.json"].iter().all(|name| folder.join(name).is_file())
+}
+
+/// Removes what an earlier run left in a folder, the model first, and the folder if nothing else is in it: a pair that
+/// is refused has no model, and its folder shows none.
+pub(crate) fn clear(folder: &Path) -> Result<(), ExportError> {
+    if !is_result(folder) {
+        return Ok(());
+    }
+    let files = ["model.ply", "skeleton.ply", "boundary.ply", PAGE].map(PathBuf::from);
+    let pictures = pictures::NAMES.iter().map(|name| Path::new(PICTURES).join(name));
+    for name in files.into_iter().chain(pictures).chain(["report.json".into()]) {
+        let path = folder.join(name);
+        if path.is_file() {
+            std::fs::remove_file(&path).map_err(|source| failed(&path, source))?;
+        }
+    }
+    for folder in [&folder.join(PICTURES), folder] {
+        // What still holds files stays.
+        let _ = std::fs::remove_dir(folder);
+    }
+    Ok(())
 }
 
 /// Creates or replaces files, whose folders exist. All are complete beside their final names before the
@@ -240,6 +262,26 @@ mod tests {
             files.iter().filter(|f| **f != "report.html").copied().collect::<Vec<_>>()
         );
         assert_eq!(names(&folder.join(PICTURES)), ["mine.png"]);
+    }
+
+    #[test]
+    fn what_a_run_left_is_cleared_by_name() {
+        let parent = tempfile::tempdir().unwrap();
+        let folder = parent.path().join("model");
+        write(&folder, &Capsule::new(Mode::Default, Record::new()).run(), true).unwrap();
+        fs::write(folder.join("pictures/mine.png"), "kept").unwrap();
+        clear(&folder).unwrap();
+        assert_eq!(
+            (names(&folder), names(&folder.join(PICTURES))),
+            (vec![PICTURES.into()], vec!["mine.png".into()])
+        );
+        fs::remove_dir_all(&folder).unwrap();
+        write(&folder, &Capsule::new(Mode::Default, Record::figures_only()).run(), false).unwrap();
+        clear(&folder).unwrap();
+        clear(&folder).unwrap();
+        fs::write(parent.path().join("model.ply"), "somebody's").unwrap();
+        clear(parent.path()).unwrap();
+        assert_eq!(names(parent.path()), ["model.ply"]);
     }
 
     #[test]

@@ -312,6 +312,42 @@ fn failures_are_json_too_if_asked_for() {
     }
 }
 
+/// Names that are no text are JSON all the same.
+#[cfg(target_os = "linux")]
+#[test]
+fn folders_of_any_name_are_told() {
+    use std::os::unix::ffi::OsStrExt;
+    let folder = TempDir::new().unwrap();
+    let odd = std::ffi::OsStr::from_bytes(b"odd\xff");
+    fs::create_dir(folder.path().join(odd)).unwrap();
+    for file in ["left.png", "right.png", "calib.yaml"] {
+        fs::copy(torus(file), folder.path().join(odd).join(file)).unwrap();
+    }
+    fs::copy(torus("left.png"), folder.path().join(odd).join("left_7.png")).unwrap();
+    let host = || {
+        let mut command = Command::cargo_bin("host").unwrap();
+        command.current_dir(folder.path());
+        command
+    };
+    let replay = host().args(["replay", ".", "--no-pictures", "--json", "--out"]).arg(odd).output().unwrap();
+    assert_eq!(replay.status.code(), Some(0), "{replay:?}");
+    let told = json(std::str::from_utf8(&replay.stdout).unwrap());
+    assert!(told["pairs"][0]["calibration_found"].as_str().unwrap().ends_with("calib.yaml"), "{told}");
+    assert!(told["without_partner"][0].as_str().unwrap().ends_with("left_7.png"), "{told}");
+    let capture =
+        ["capture", "--device", "/dev/null", "--focal", "300", "--baseline", "60", "--json", "--out"];
+    assert_eq!(host().args(capture).arg(odd).output().unwrap().status.code(), Some(1));
+    for (args, code) in [
+        (&["man", "--json"][..], 0),
+        (&["config", "--json", "--init"], 1),
+        (&["convert", "--json", "a.ply"], 1),
+    ] {
+        let output = host().args(args).arg(odd).output().unwrap();
+        assert_eq!(output.status.code(), Some(code), "{args:?}: {output:?}");
+        json(std::str::from_utf8(&output.stdout).unwrap());
+    }
+}
+
 #[test]
 fn what_is_suspicious_about_a_file_is_told_with_its_refusal() {
     let folder = TempDir::new().unwrap();

@@ -28,7 +28,7 @@ impl fmt::Display for Place {
 #[derive(Debug, thiserror::Error)]
 pub enum CalibrationError {
     /// The file or folder could not be read.
-    #[error("cannot read the calibration {}: {source}", path.display())]
+    #[error("cannot read the calibration {}", path.display())]
     Unreadable {
         /// What was asked for.
         path: PathBuf,
@@ -36,7 +36,7 @@ pub enum CalibrationError {
         source: io::Error,
     },
     /// The file could not be written.
-    #[error("cannot write the calibration {}: {source}", path.display())]
+    #[error("cannot write the calibration {}", path.display())]
     Unwritable {
         /// What was asked for.
         path: PathBuf,

@@ -284,8 +284,7 @@ fn files(path: &Path) -> Result<(PathBuf, Option<PathBuf>), CalibrationError> {
             .find_map(|[a, b]| Some((named(a)?, Some(named(b)?))))
             .ok_or_else(|| CalibrationError::Unreadable {
                 path: path.into(),
-                source: io::Error::new(
-                    io::ErrorKind::NotFound,
+                source: io::Error::other(
                     "the folder holds neither left.yaml and right.yaml nor intrinsics.yml and extrinsics.yml",
                 ),
             })

@@ -87,7 +87,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     table.row("size error", &format!("{width:+.1} mm wide, {height:+.1} high, {depth:+.1} deep"));
     evaluate::tell(&found, &mut table);
     for warning in &model.warnings {
-        table.row("warning", warning);
+        table.warning(warning);
     }
     let [all, rendered, made] = [start.elapsed(), rendered, model.time].map(|time| time.as_secs_f64());
     table.row(

@@ -23,7 +23,7 @@ use shared::wire::{Exposure, ExposureSetting, Health, PictureKind, ToDevice, cal
 
 use super::connect::{PortArgs, check_calibration, hello_as_json, model_of, reset, version};
 use super::table::Table;
-use super::{Failure, say, say_json};
+use super::{Failure, of_system, say, say_json, shown};
 use crate::output::{grey_png, write_together};
 use crate::reconstruct::Refusal;
 use crate::report::words::{parse_polarity, parse_threshold};
@@ -52,31 +52,37 @@ pub struct Args {
 #[derive(Debug, clap::Subcommand)]
 enum Action {
     /// Who it is and how it fares
+    #[command(after_help = "Examples:\n  host device info --json")]
     Info,
     /// Have it keep a calibration
+    #[command(after_help = "Examples:\n  host device calibrate calib.yaml --port /dev/ttyACM0")]
     Calibrate {
         /// The calibration of its pictures: OpenCV (M1 D1 M2 D2 R T), ROS or Kalibr
         file: PathBuf,
     },
     /// How it takes pictures
+    #[command(after_help = "Examples:\n  host device expose auto\n  host device expose 400,2.5")]
     Expose {
         /// auto, or exposed lines and gain, as in 400,2.5
         #[arg(value_name = "auto|LINES,GAIN", value_parser = parse_exposure)]
         setting: ExposureSetting,
     },
     /// Where it parts object and background
+    #[command(after_help = "Examples:\n  host device threshold 90")]
     Threshold {
         /// otsu, or a grey level
         #[arg(value_name = "otsu|N", value_parser = parse_threshold)]
         threshold: Threshold,
     },
     /// Whether it looks for a bright or a dark object
+    #[command(after_help = "Examples:\n  host device polarity dark")]
     Polarity {
         /// bright, dark or auto
         #[arg(value_name = "bright|dark|auto", value_parser = parse_polarity)]
         polarity: Polarity,
     },
     /// Fetch a pair of pictures
+    #[command(after_help = "Examples:\n  host device grab grey --out pair")]
     Grab {
         /// As the cameras see it, or the object that was found
         kind: Kind,
@@ -121,7 +127,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             };
             let files = write(out, &grab(&mut session, kind)?)?;
             let text = files.iter().map(|file| format!("{}\n", file.display())).collect();
-            (json!({ "files": files }), text)
+            (json!({ "files": files.each_ref().map(|file| shown(file)) }), text)
         }
         (Action::Info | Action::Calibrate { .. }, _) => {
             let health = session.health()?;
@@ -229,7 +235,8 @@ fn grab(session: &mut Session, kind: PictureKind) -> Result<[GrayImage; 2], Fail
 }
 
 fn write(folder: &Path, pictures: &[GrayImage; 2]) -> Result<[PathBuf; 2], Failure> {
-    std::fs::create_dir_all(folder).map_err(|error| format!("cannot make {}: {error}", folder.display()))?;
+    let told = |error| format!("cannot make {}: {}", shown(folder), of_system(&error));
+    std::fs::create_dir_all(folder).map_err(told)?;
     let files = ["left.png", "right.png"].map(|name| folder.join(name));
     let [left, right] = &files;
     write_together(&[(left, grey_png(&pictures[0])?), (right, grey_png(&pictures[1])?)])?;

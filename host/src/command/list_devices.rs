@@ -12,7 +12,7 @@
 use serde_json::{Value, json};
 
 use super::table::Table;
-use super::{Failure, say, say_json, words_of};
+use super::{Failure, say, say_json, shown, words_of};
 use crate::source::serial::list::{SerialPort, ports as serial_ports};
 use crate::source::v4l::choose::{Camera, Choice, Offer, Request, Sizes, choose, sizes_in_words};
 use crate::source::v4l::errors::CameraError;
@@ -145,7 +145,7 @@ fn camera_as_json(camera: &Found) -> Value {
         })
     });
     json!({
-        "device": camera.path,
+        "device": shown(&camera.path),
         "name": camera.name,
         "bus": camera.bus,
         "driver": camera.driver,
@@ -181,7 +181,7 @@ mod tests {
         let cameras = [Ok(camera), Err(busy)];
         let text = cameras_as_text(&cameras);
         for words in [
-            "/dev/video0\n",
+            "/dev/video0",
             "3D USB Camera",
             "YUYV (YUYV 4:2:2)",
             "1280x480 at 30, 29.97/s",

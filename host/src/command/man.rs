@@ -6,15 +6,18 @@
 
 use std::path::PathBuf;
 
-use clap::CommandFactory;
+use serde_json::json;
 
-use super::{Cli, Failure, say};
+use super::{Failure, line, of_system, say, say_json, shown};
 
 /// Arguments of `man`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Folder for the pages, which is created if it is missing
     folder: PathBuf,
+    /// Print one JSON document instead of text
+    #[arg(long)]
+    pub(super) json: bool,
 }
 
 /// Writes the pages.
@@ -23,8 +26,9 @@ pub struct Args {
 ///
 /// If the folder or a page cannot be written.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let told = |error| format!("cannot write {}: {error}", args.folder.display());
+    let told = |error| format!("cannot write {}: {}", shown(&args.folder), of_system(&error));
     std::fs::create_dir_all(&args.folder).map_err(told)?;
-    clap_mangen::generate_to(Cli::command(), &args.folder).map_err(told)?;
-    say(&format!("{}\n", args.folder.display()))
+    clap_mangen::generate_to(line::command(), &args.folder).map_err(told)?;
+    let folder = shown(&args.folder);
+    if args.json { say_json(&json!({ "folder": folder })) } else { say(&format!("{folder}\n")) }
 }

@@ -2,6 +2,13 @@
 //!
 //! Every length is in millimetres, in the axes of the left camera: x right, y down, z forward.
 //!
+//! What is not given is taken from `ossature.toml` in this folder or the nearest above it (`host config --help`).
+//! With --json, results and errors are JSON on standard output (docs/json.md); progress, warnings and the sentence of
+//! an error go to standard error. Colours and bars are for terminals; NO_COLOR and --color are heeded.
+//!
+//! Exit codes: 0 done; 1 refused or failed; 2 wrong usage, of the command line or of the configuration; 130 ended
+//! at once by a second Ctrl-C.
+//!
 //! Examples:
 //!   host demo                               try it: no camera, no files needed
 //!   host replay left.png right.png --calib calib.yaml
@@ -13,8 +20,7 @@
 //!   host list-devices                       cameras and boards that are plugged in
 //!   host capture --device /dev/video0 --calib calib.yaml
 //!   host experiments                        the paper's experiments, rerun
-//!
-//! Exit codes: 0 done, 1 refused or failed, 2 wrong usage.
+//!   host config replay                      what it would take, and from where
 
 pub mod calibrate;
 pub mod capture;
@@ -28,8 +34,11 @@ pub mod list_devices;
 pub mod listen;
 pub mod looks;
 mod batch;
+mod color;
+pub mod config;
 mod connect;
 pub mod convert;
+mod line;
 pub mod man;
 mod model;
 pub mod options;
@@ -40,11 +49,17 @@ mod table;
 mod timings;
 
 use std::error::Error;
+use std::ffi::OsString;
 use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, LazyLock};
 
-use clap::{Parser, Subcommand};
+use clap::{ColorChoice, Parser, Subcommand};
+use serde_json::json;
+
+use line::Line;
 
 /// Why a command did not do what it was asked.
 pub type Failure = Box<dyn Error + Send + Sync>;
@@ -60,6 +75,30 @@ pub type Failure = Box<dyn Error + Send + Sync>;
 pub struct Cli {
     #[command(subcommand)]
     command: Command,
+    #[command(flatten)]
+    everywhere: Everywhere,
+}
+
+/// What holds for every command.
+#[derive(Clone, Debug, clap::Args)]
+#[command(next_help_heading = "Everywhere")]
+pub struct Everywhere {
+    /// Take what is not given here from this file [default: ossature.toml here, or in the nearest folder above]
+    #[arg(long, global = true, value_name = "FILE", env = "OSSATURE_CONFIG", hide_env_values = true)]
+    config: Option<PathBuf>,
+    /// Take nothing from a file
+    #[arg(long, global = true)]
+    no_config: bool,
+    /// Whether to colour what is written
+    #[arg(
+        long,
+        global = true,
+        value_enum,
+        default_value = "auto",
+        hide_possible_values = true,
+        value_name = "auto|always|never"
+    )]
+    color: ColorChoice,
 }
 
 /// What can be asked for.
@@ -101,6 +140,9 @@ enum Command {
     /// One stage of one view, drawn and timed
     #[command(long_about = page(include_str!("inspect.rs")))]
     Inspect(inspect::Args),
+    /// Every value, and where it comes from
+    #[command(long_about = page(include_str!("config.rs")))]
+    Config(config::Args),
     /// Completions for a shell
     #[command(long_about = page(include_str!("completions.rs")))]
     Completions(completions::Args),
@@ -109,28 +151,66 @@ enum Command {
     Man(man::Args),
 }
 
+/// Does what a command line asks for, the program's name first; says why not, and gives the exit code.
+#[must_use]
+pub fn main(arguments: Vec<OsString>) -> ExitCode {
+    color::choose(color::typed(&arguments));
+    let wants_json =
+        |words: &[OsString]| words.iter().take_while(|word| *word != "--").any(|word| word == "--json");
+    let (mut json, mut line) = (wants_json(&arguments), Line::default());
+    let result = Line::read(arguments).map_err(Failure::from).and_then(|read| {
+        line = read;
+        json = wants_json(&line.arguments);
+        line.cli()?.run()
+    });
+    let Err(failure) = result else { return ExitCode::SUCCESS };
+    let Some(usage) = failure.downcast_ref::<clap::Error>() else {
+        note(&format!("error: {}", words_of(&*failure)));
+        return ExitCode::FAILURE;
+    };
+    if json && usage.use_stderr() {
+        // The failure itself matters more than that it cannot be told here.
+        let _ = say_json_line(&json!({ "error": sentence_of(usage) }));
+    }
+    // When nobody listens there is nobody to tell.
+    let _ = usage.print();
+    line.origins(&usage.to_string()).iter().for_each(|origin| note(&format!("note: {origin}")));
+    u8::try_from(usage.exit_code()).map_or(ExitCode::FAILURE, ExitCode::from)
+}
+
+/// What the parser says, in one line.
+fn sentence_of(usage: &clap::Error) -> String {
+    let text = usage.to_string();
+    let text = text.split("\n\nUsage:").next().unwrap_or_default();
+    let text = text.split("\n\nFor more information").next().unwrap_or_default();
+    let lines = text.trim_start_matches("error: ").lines().map(str::trim).filter(|line| !line.is_empty());
+    lines.collect::<Vec<_>>().join(" ")
+}
+
 impl Cli {
     /// Does what the command line asks for.
     ///
     /// # Errors
     ///
     /// A [`clap::Error`] for wrong usage; otherwise a sentence for the user.
-    pub fn run(&self) -> Result<(), Failure> {
+    fn run(&self) -> Result<(), Failure> {
+        color::choose(self.everywhere.color);
         match &self.command {
             Command::Replay(args) => replay::run(args),
             Command::Capture(args) => capture::run(args),
             Command::ListDevices(args) => told(args.json, list_devices::run(args)),
             Command::Calibrate(args) => calibrate::run(args),
-            Command::Listen(args) => told_in_line(args.json, listen::run(args)),
+            Command::Listen(args) => told(args.json, listen::run(args)),
             Command::Device(args) => told(args.json, device::run(args)),
             Command::Demo(args) => told(args.json, demo::run(args)),
-            Command::Render(args) => render::run(args),
+            Command::Render(args) => told(args.json, render::run(args)),
             Command::Evaluate(args) => told(args.json, evaluate::run(args)),
             Command::Convert(args) => told(args.json, convert::run(args)),
             Command::Experiments(args) => told(args.json, experiments::run(args)),
             Command::Inspect(args) => told(args.json, inspect::run(args)),
+            Command::Config(args) => told(args.json, config::run(args, &self.everywhere)),
             Command::Completions(args) => completions::run(args),
-            Command::Man(args) => man::run(args),
+            Command::Man(args) => told(args.json, man::run(args)),
         }
     }
 }
@@ -141,7 +221,7 @@ pub fn words_of(failure: &(dyn Error + 'static)) -> String {
     let mut words = failure.to_string();
     let mut cause = failure.source();
     while let Some(error) = cause {
-        let more = error.to_string();
+        let more = error.downcast_ref().map_or_else(|| error.to_string(), of_system);
         if !words.contains(&more) {
             words = format!("{words}: {more}");
         }
@@ -150,9 +230,27 @@ pub fn words_of(failure: &(dyn Error + 'static)) -> String {
     words
 }
 
-/// Writes to standard output. That nobody reads on (`| head`) is no failure.
+/// What the system says, for people; with what to do where that is clear. Sentences of our own are of no such kind.
+fn of_system(error: &io::Error) -> String {
+    use io::ErrorKind;
+    match error.kind() {
+        ErrorKind::NotFound => "there is no such file or folder".into(),
+        ErrorKind::PermissionDenied => "you may not; look at who owns it".into(),
+        ErrorKind::AlreadyExists => "what has that name is no folder; name another".into(),
+        ErrorKind::NotADirectory => "a file is where a folder should be; name another".into(),
+        ErrorKind::IsADirectory => "it is a folder".into(),
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
+            "there is no room; make some and try again".into()
+        }
+        ErrorKind::InvalidData if error.get_ref().is_none() => "it is no text".into(),
+        ErrorKind::ReadOnlyFilesystem => "nothing can be written there; name another folder".into(),
+        _ => error.to_string(),
+    }
+}
+
+/// Writes to standard output, styles only where they are wanted. That nobody reads on (`| head`) is no failure.
 fn say(text: &str) -> Result<(), Failure> {
-    let mut out = io::stdout().lock();
+    let mut out = anstream::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
             Err(format!("cannot write to standard output: {error}").into())
@@ -171,27 +269,14 @@ fn say_json_line(value: &serde_json::Value) -> Result<(), Failure> {
     say(&format!("{value}\n"))
 }
 
-/// Passes a result on; a failure is a JSON document too, if one was asked for.
+/// Passes a result on; a failure is a line of JSON too, if JSON was asked for. Wrong usage is told by [`main`].
 fn told<T>(json: bool, result: Result<T, Failure>) -> Result<T, Failure> {
-    told_by(say_json, json, result)
-}
-
-/// Passes a result on; a failure is a line of JSON too, if lines were asked for.
-fn told_in_line<T>(json: bool, result: Result<T, Failure>) -> Result<T, Failure> {
-    told_by(say_json_line, json, result)
-}
-
-fn told_by<T>(
-    say: fn(&serde_json::Value) -> Result<(), Failure>,
-    json: bool,
-    result: Result<T, Failure>,
-) -> Result<T, Failure> {
     if let Err(failure) = &result
         && json
         && !failure.is::<clap::Error>()
     {
         // The failure itself matters more than that it cannot be told here.
-        let _ = say(&serde_json::json!({ "error": words_of(&**failure) }));
+        let _ = say_json_line(&json!({ "error": words_of(&**failure) }));
     }
     result
 }
@@ -214,9 +299,14 @@ fn interruption() -> Result<Arc<AtomicBool>, Failure> {
     Ok(Arc::clone(stop))
 }
 
+/// A path in words. Not every path is text, and JSON is.
+fn shown(path: &Path) -> String {
+    path.display().to_string()
+}
+
 /// Writes a line to standard error, if anybody listens.
 fn note(line: &str) {
-    let _ = writeln!(io::stderr(), "{line}");
+    let _ = writeln!(anstream::stderr(), "{}", color::line(line));
 }
 
 /// The help page at the head of a source file: its `//!` lines. Paragraphs become one line each, which is
@@ -240,11 +330,10 @@ fn page(source: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory;
 
     #[test]
     fn the_command_line_is_sound() {
-        Cli::command().debug_assert();
+        line::command().debug_assert();
     }
 
     #[test]

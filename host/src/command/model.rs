@@ -9,8 +9,8 @@ use nalgebra::Vector3;
 use shared::camera::PairModel;
 use shared::wire::Decoder;
 
-use super::Failure;
 use super::table::{Table, count, percent, sides};
+use super::{Failure, words_of};
 use crate::calibration::StereoCamera;
 use crate::mesh::Mesh;
 use crate::output;
@@ -40,6 +40,16 @@ pub(super) struct Place<'a> {
     pub(super) report: bool,
     /// Whether there is to be a page about it.
     pub(super) page: bool,
+}
+
+impl Place<'_> {
+    /// That a pair is refused; the model of an earlier one must not stand for it.
+    fn refused(&self, refusal: Refusal) -> Failure {
+        match output::clear(self.folder) {
+            Ok(()) => refusal.into(),
+            Err(error) => format!("{refusal}; an earlier model stays: {}", words_of(&error)).into(),
+        }
+    }
 }
 
 /// What is told of a model; its surface is in its file alone.
@@ -76,7 +86,8 @@ pub(super) fn make_and_keep(
     let start = Instant::now();
     let Order { images, calibration, options, truth, .. } = order;
     let mut record = if order.pictures { Record::new() } else { Record::figures_only() };
-    let made = workspace.reconstruct(images.each_ref(), calibration, options, &mut record)?;
+    let made = workspace.reconstruct(images.each_ref(), calibration, options, &mut record);
+    let made = made.map_err(|refusal| order.place.refused(refusal))?;
     let run = Run { calibration, options, reconstruction: &made, record: &record, truth };
     Ok((Model::written(order.place, &run, start)?, made))
 }
@@ -90,7 +101,8 @@ pub(super) fn make_as_device(
     workspace: &mut Workspace,
 ) -> Result<Model, Failure> {
     let start = Instant::now();
-    let (device, bytes) = describe(left, right, calibration, options)?;
+    let described = describe(left, right, calibration, options);
+    let (device, bytes) = described.map_err(|refusal| place.refused(refusal))?;
     let mut inbox = Inbox::new()?;
     let mut buffer = vec![0; bytes.len()];
     let mut decoder = Decoder::new(&mut buffer);
@@ -111,12 +123,13 @@ pub(super) fn receive(
     workspace: &mut Workspace,
 ) -> Result<Model, Failure> {
     let start = Instant::now();
-    let outcome = pair.result.map_err(Refusal::from)?;
+    let outcome = pair.result.map_err(|finding| place.refused(finding.into()))?;
     let mut record = Record::figures_only();
     for (k, eye) in record.eyes.iter_mut().enumerate() {
         (eye.parts.level, eye.parts.area) = (pair.levels[k], outcome.areas[k] as usize);
     }
-    let made = workspace.reconstruct_shape((&mut inbox.memory(), outcome), model, options, &mut record)?;
+    let made = workspace.reconstruct_shape((&mut inbox.memory(), outcome), model, options, &mut record);
+    let made = made.map_err(|refusal| place.refused(refusal))?;
     let calibration = &model.into();
     let run = Run { calibration, options, reconstruction: &made, record: &record, truth: None };
     let told = Model::written(place, &run, start)?;

@@ -2,13 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
+use clap::ValueEnum;
+use clap::builder::ValueHint;
 use clap::error::ErrorKind;
-use clap::{CommandFactory, ValueEnum};
 use image::GrayImage;
 use shared::stage::binarise::{Polarity, Threshold};
 use shared::stage::thinning::Rule;
 
-use super::{Cli, Failure, words_of};
+use super::{Failure, line, words_of};
 use crate::calibration::StereoCamera;
 use crate::reconstruct::{self, Options, Pieces, Profile, Radius, Skeleton};
 use crate::report::words::{parse_polarity, parse_rule, parse_threshold};
@@ -233,7 +234,7 @@ impl CameraArgs {
 pub struct SceneArgs {
     /// The scene without the object, to be taken away: one image with both views, LEFT,RIGHT, a folder with
     /// one pair, or `first` for the first pair; then the object is bright, whatever it was
-    #[arg(long, value_name = "FILE|first")]
+    #[arg(long, value_name = "FILE|first", value_hint = ValueHint::AnyPath)]
     background: Option<String>,
     /// The part of both views to look at, px
     #[arg(long, value_name = "X,Y,W,H")]
@@ -280,7 +281,7 @@ impl SceneArgs {
 
 /// Wrong usage that the parser cannot see.
 pub(super) fn usage(what: &str) -> Failure {
-    Cli::command().error(ErrorKind::ArgumentConflict, what).into()
+    line::command().error(ErrorKind::ArgumentConflict, what).into()
 }
 
 /// Whether a lens of this focal length, px, can be in front of an image of this width, px.

@@ -19,12 +19,13 @@ use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use nalgebra::Point3;
+use serde_json::json;
 
 use super::looks::Looks;
 use super::options::{check_focal, positive, usage};
 use super::scene::{Scene, write};
 use super::table::{Table, sides};
-use super::{Failure, note, say};
+use super::{Failure, note, say, say_json, shown};
 use crate::calibration::StereoCamera;
 use crate::mesh::Mesh;
 use crate::mesh::read::read;
@@ -66,6 +67,9 @@ pub struct Args {
     /// Folder for the files
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// Print one JSON document instead of text
+    #[arg(long)]
+    pub(super) json: bool,
 }
 
 /// Where the object stands.
@@ -100,16 +104,25 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let warnings = warnings.collect::<Result<Vec<_>, _>>()?;
     let mut scene = Scene::with_looks(mesh, calibration, &args.looks);
     check_shown(&scene)?;
-    for warning in warnings.into_iter().flatten() {
+    let warnings: Vec<String> = warnings.into_iter().flatten().collect();
+    for warning in &warnings {
         note(&format!("warning: {warning}"));
     }
     args.looks.disturb(&mut scene.images);
     write(&args.out, &scene)?;
-    let mut table = Table::new(&args.what);
-    if let Some([low, high]) = scene.truth.bounds() {
-        table.row("size", &sides(high - low));
+    let size = scene.truth.bounds().map(|[low, high]| high - low);
+    let folder = shown(&args.out);
+    if args.json {
+        let size = size.map(<[f64; 3]>::from);
+        return say_json(
+            &json!({ "name": args.what, "folder": folder, "size_mm": size, "warnings": warnings }),
+        );
     }
-    table.row("files", &args.out.display().to_string());
+    let mut table = Table::new(&args.what);
+    if let Some(size) = size {
+        table.row("size", &sides(size));
+    }
+    table.row("files", &folder);
     say(table.text())
 }
 

@@ -13,7 +13,7 @@
 //! Two files, or one, leave their results in --out; folders and patterns leave those of each pair in a
 //! folder of its own below. There: model.ply (closed, mm, axes of the left camera), skeleton.ply,
 //! boundary.ply, report.json and pictures of every stage. What does not give a trustworthy model is
-//! refused with the reason, and leaves no files; the other pairs go on.
+//! refused with the reason, and leaves no files, nor those of an earlier run; the other pairs go on.
 //!
 //! Pairs are made side by side, one a core; --timings tells where their time goes. Undisturbed times are those of
 //! --jobs 1.
@@ -44,9 +44,10 @@ use super::model::{self, Model, Order, Place};
 use super::options::{CameraArgs, MethodArgs, SceneArgs, usage};
 use super::table::Table;
 use super::timings::Timings;
-use super::{Failure, batch, listen, note, say, say_json, told, told_in_line, words_of};
+use super::{Failure, batch, listen, note, say, say_json, shown, told, words_of};
 use crate::reconstruct::{Options, Workspace};
 use crate::source::find::{Found, find};
+use crate::source::picture::PictureError;
 use crate::source::scene::Scene;
 use crate::source::serial::recording::is_recording;
 use crate::source::{Files, Layout, Pair, Views};
@@ -120,7 +121,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     {
         let options = recording_options(args)?;
         let wanted = Wanted { page: args.report, json: args.json, timings: args.timings };
-        return told_in_line(args.json, listen::replay(Path::new(input), &options, &args.out, wanted));
+        return told(args.json, listen::replay(Path::new(input), &options, &args.out, wanted));
     }
     let mut options = if args.as_device { args.method.device_options() } else { args.method.options() }?;
     let one_file = args.layout.filter(|layout| *layout != Layout::Two);
@@ -252,7 +253,7 @@ fn with_warnings(warnings: &[String], failure: Failure) -> Failure {
 /// A failure, with a hint if the user may have forgotten the other image.
 fn with_guess(pair: &Pair, failure: Failure) -> Failure {
     match pair.files {
-        Files::One(_, None) => format!(
+        Files::One(_, None) if !failure.is::<PictureError>() => format!(
             "{}; one image was given and taken for both views: give two, or --layout if it was halved the wrong way",
             words_of(&*failure)
         )
@@ -271,10 +272,10 @@ fn as_text(done: &[Done<'_>], found: &Found) -> String {
             table.row("calibration", &format!("{}, found beside the images", path.display()));
         }
         for warning in &success.warnings {
-            table.row("warning", warning);
+            table.warning(warning);
         }
         table.row("time", &format!("{:.2} s", success.model.time.as_secs_f64()));
-        table.row("files", &folder.display().to_string());
+        table.row("files", &shown(folder));
         text.push_str(table.text());
     }
     if !found.single {
@@ -292,14 +293,15 @@ fn as_json(done: &[Done<'_>], found: &Found) -> serde_json::Value {
     let pair = |Done { pair, folder, result }: &Done<'_>| match result {
         Ok(Success { model, warnings, calibration, .. }) => json!({
             "name": pair.name,
-            "folder": folder.display().to_string(),
-            "calibration_found": calibration,
+            "folder": shown(folder),
+            "calibration_found": calibration.as_deref().map(shown),
             "warnings": warnings,
             "report": model.report,
         }),
         Err(failure) => json!({ "name": pair.name, "error": words_of(&**failure) }),
     };
-    json!({ "pairs": done.iter().map(pair).collect::<Vec<_>>(), "without_partner": found.alone })
+    let alone: Vec<String> = found.alone.iter().map(|path| shown(path)).collect();
+    json!({ "pairs": done.iter().map(pair).collect::<Vec<_>>(), "without_partner": alone })
 }
 
 /// Says which pairs were refused. The only pair's refusal is the command's.

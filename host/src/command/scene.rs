@@ -5,8 +5,8 @@ use std::path::Path;
 
 use image::GrayImage;
 
-use super::Failure;
 use super::looks::Looks;
+use super::{Failure, of_system, shown};
 use crate::calibration::StereoCamera;
 use crate::export::{ply, write_whole};
 use crate::mesh::Mesh;
@@ -36,7 +36,7 @@ impl Scene {
 
 /// Writes left.png, right.png, calib.yaml and truth.ply into a folder, which is made if need be.
 pub(super) fn write(folder: &Path, scene: &Scene) -> Result<(), Failure> {
-    let made = |error| format!("cannot make the folder {}: {error}", folder.display());
+    let made = |error| format!("cannot make the folder {}: {}", shown(folder), of_system(&error));
     std::fs::create_dir_all(folder).map_err(made)?;
     for (image, name) in scene.images.iter().zip(["left.png", "right.png"]) {
         let mut bytes = std::io::Cursor::new(Vec::new());

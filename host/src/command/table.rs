@@ -4,6 +4,8 @@ use std::fmt::Write;
 
 use nalgebra::Vector3;
 
+use super::color::{BOLD, WARNING};
+
 /// Width of the names.
 const NAMES: usize = 12;
 
@@ -14,13 +16,18 @@ pub(super) struct Table(String);
 impl Table {
     /// A table under a heading.
     pub(super) fn new(heading: &str) -> Self {
-        Self(format!("{heading}\n"))
+        Self(format!("{BOLD}{heading}{BOLD:#}\n"))
     }
 
     /// Adds a row.
     pub(super) fn row(&mut self, name: &str, value: &str) {
         // Writing to a string does not fail.
         let _ = writeln!(self.0, "  {name:NAMES$}  {value}");
+    }
+
+    /// Adds a row with what should be known.
+    pub(super) fn warning(&mut self, sentence: &str) {
+        let _ = writeln!(self.0, "  {WARNING}{:NAMES$}{WARNING:#}  {sentence}", "warning");
     }
 
     /// The text, a line each row.

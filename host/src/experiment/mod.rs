@@ -92,7 +92,7 @@ pub enum ExperimentError {
     #[error(transparent)]
     Export(#[from] ExportError),
     /// A file could not be written or moved.
-    #[error("cannot write the experiments into {path}: {source}")]
+    #[error("cannot write the experiments into {path}")]
     Folder {
         /// The folder of the results.
         path: String,

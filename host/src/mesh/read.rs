@@ -44,7 +44,7 @@ pub enum ReadError {
         path: PathBuf,
     },
     /// The bytes are not what the extension says, or end too early.
-    #[error("{} is no sound mesh: {what}", path.display())]
+    #[error("{} is no sound mesh: {what}; mend it or export it again", path.display())]
     Content {
         /// The file.
         path: PathBuf,
@@ -134,7 +134,10 @@ mod tests {
             told("a.glb", b""),
             "F/a.glb is not a mesh by its name; it must end in .ply, .obj or .stl"
         );
-        assert_eq!(told("a.OBJ", b"v 1 2 3\n"), "F/a.OBJ is no sound mesh: it has no faces");
+        assert_eq!(
+            told("a.OBJ", b"v 1 2 3\n"),
+            "F/a.OBJ is no sound mesh: it has no faces; mend it or export it again"
+        );
         assert!(told("a.ply", b"").starts_with("F/a.ply is no sound mesh: "));
         assert!(told("a.stl", b"").starts_with("F/a.stl is no sound mesh: "));
         assert!(read(&folder.path().join("none.ply")).unwrap_err().to_string().starts_with("cannot read "));

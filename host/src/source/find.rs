@@ -38,7 +38,7 @@ pub enum FindError {
         path: PathBuf,
     },
     /// Not a pattern.
-    #[error("{pattern} is no pattern")]
+    #[error("{pattern} is no pattern; * and ? stand for what may differ")]
     Pattern {
         /// What was named.
         pattern: String,
@@ -63,6 +63,12 @@ pub enum FindError {
         named: String,
         /// Images that are there.
         images: usize,
+    },
+    /// There is nothing to look through.
+    #[error("there are no images in {named}; PNG, JPEG, PGM, BMP and TIFF are looked for by their names")]
+    NoImages {
+        /// What was named.
+        named: String,
     },
     /// Two files of one eye, as a shell makes them of a pattern.
     #[error(
@@ -174,6 +180,9 @@ fn search(inputs: &[String], layout: Option<Layout>) -> Result<Found, FindError>
             let calibration = calibration_beside(first, root);
             found.insert(first.clone(), Pair { name, files, calibration });
         }
+    }
+    if candidates.is_empty() {
+        return Err(FindError::NoImages { named: inputs.join(" ") });
     }
     if found.is_empty() {
         return Err(FindError::NoPairs { named: inputs.join(" "), images: candidates.len() });

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::super::model::Model;
 use super::super::table::{Table, count};
-use super::super::{Failure, note, say, words_of};
+use super::super::{Failure, note, say, shown, words_of};
 use super::session::{Done, Session};
 use crate::source::v4l::live::Tally;
 
@@ -81,7 +81,7 @@ impl Session<'_> {
         if let Some((name, model)) = best {
             table.row("best", name);
             model.tell(&mut table);
-            model.warnings.iter().for_each(|warning| table.row("warning", warning));
+            model.warnings.iter().for_each(|warning| table.warning(warning));
         }
         if good > 0 && !self.args.only_record {
             table.row("files", &self.args.out.display().to_string());
@@ -112,8 +112,8 @@ impl Session<'_> {
         let losses = tally.losses;
         json!({
             "pairs": self.done.iter().map(pair).collect::<Vec<_>>(),
-            "folder": self.args.out,
-            "recording": self.args.record,
+            "folder": shown(&self.args.out),
+            "recording": self.args.record.as_deref().map(shown),
             "best": best.map(|(name, model)| json!({ "name": name, "report": model.report })),
             "dropped_pairs": tally.dropped,
             "unpaired_frames": losses.unpaired,

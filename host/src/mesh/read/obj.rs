@@ -19,9 +19,19 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Mesh, String> {
         ignore_lines: true,
         ..tobj::LoadOptions::default()
     };
-    let (models, _) =
-        tobj::load_obj_buf(&mut Cursor::new(shape), &options, |_| Err(tobj::LoadError::OpenFileFailed))
-            .map_err(|error| error.to_string())?;
+    let mut lines = Cursor::new(shape.as_bytes());
+    let (models, _) = tobj::load_obj_buf(&mut lines, &options, |_| Err(tobj::LoadError::OpenFileFailed))
+        .map_err(|error| {
+            use tobj::LoadError::{FaceParseError, FaceVertexOutOfBounds, PositionParseError};
+            let read = &shape.as_bytes()[..lines.position() as usize];
+            let line = read.iter().filter(|byte| **byte == b'\n').count();
+            match error {
+                PositionParseError => format!("line {line} is no vertex"),
+                FaceParseError => format!("line {line} is no face"),
+                FaceVertexOutOfBounds => "a face names a vertex that is not there".into(),
+                other => other.to_string(),
+            }
+        })?;
     let mut mesh = Mesh::default();
     for tobj::Model { mesh: model, .. } in models {
         let coordinates = model.positions.as_chunks().0;
@@ -31,7 +41,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Mesh, String> {
     Ok(mesh)
 }
 
-/// The positions and faces of the file alone. Groups would split vertices that they share, and `tobj`
+/// The positions and faces of the file alone, in the lines where they stand. Groups would split vertices that they share, and `tobj`
 /// overflows on texture and normal indices that are not there.
 fn shape_only(text: &str) -> String {
     let mut shape = String::with_capacity(text.len());
@@ -40,7 +50,7 @@ fn shape_only(text: &str) -> String {
         let kept: Vec<&str> = match words.next() {
             Some("v") => ["v"].into_iter().chain(words.take(3)).collect(),
             Some("f") => ["f"].into_iter().chain(words.map(position_index)).collect(),
-            _ => continue,
+            _ => Vec::new(),
         };
         shape.push_str(&kept.join(" "));
         shape.push('\n');
@@ -85,6 +95,13 @@ mod tests {
         ] {
             assert!(parse(format!("{vertices}{bad}\n").as_bytes()).is_err(), "{bad}");
         }
+    }
+
+    #[test]
+    fn the_line_is_told() {
+        let told = |bad: &str| parse(format!("# a triangle\nv 0 0 0\n\nvt 1 1\n{bad}\nv 1 0 0\n").as_bytes());
+        assert_eq!(told("v 1 x 0").unwrap_err(), "line 5 is no vertex");
+        assert_eq!(told("f 1 a 2").unwrap_err(), "line 5 is no face");
     }
 
     #[test]

@@ -20,7 +20,8 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Geometry, String> {
     let mut values = match header.format {
         Format::Ascii => {
             let text = str::from_utf8(body).map_err(|_| "its values are not text")?;
-            Values::Ascii(text.split_ascii_whitespace())
+            let above = bytes[..bytes.len() - body.len()].iter().filter(|byte| **byte == b'\n').count();
+            Values::Ascii { words: text.split_ascii_whitespace(), text, above }
         }
         Format::LittleEndian => Values::Binary { rest: body, little: true },
         Format::BigEndian => Values::Binary { rest: body, little: false },
@@ -272,17 +273,28 @@ impl Property {
 
 /// The values behind the header. Every type of PLY is exact in an f64.
 enum Values<'a> {
-    Ascii(SplitAsciiWhitespace<'a>),
-    Binary { rest: &'a [u8], little: bool },
+    /// Words of a text that so many lines stand above.
+    Ascii {
+        words: SplitAsciiWhitespace<'a>,
+        text: &'a str,
+        above: usize,
+    },
+    Binary {
+        rest: &'a [u8],
+        little: bool,
+    },
 }
 
 impl Values<'_> {
     fn next(&mut self, kind: Kind) -> Result<f64, String> {
         match self {
-            Self::Ascii(words) => {
+            Self::Ascii { words, text, above } => {
                 let word = words.next().ok_or("the file ends too early")?;
-                let value: f64 = word.parse().map_err(|_| format!("\"{word}\" is not a number"))?;
-                Ok(value)
+                word.parse().map_err(|_| {
+                    let before = &text[..word.as_ptr().addr() - text.as_ptr().addr()];
+                    let line = *above + before.matches('\n').count() + 1;
+                    format!("\"{word}\" in line {line} is not a number")
+                })
             }
             Self::Binary { rest, little } => {
                 let little = *little;

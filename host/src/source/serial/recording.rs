@@ -51,7 +51,7 @@ pub enum RecordingError {
         at: usize,
     },
     /// A file without a calibration.
-    #[error("the recording {} ends before its calibration", path.display())]
+    #[error("the recording {} ends before its calibration; it was cut off, so record again", path.display())]
     Empty {
         /// The file.
         path: PathBuf,
