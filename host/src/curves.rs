@@ -1,5 +1,7 @@
 //! Curves and points in space: what a skeleton and a boundary are.
 
+pub mod spline;
+
 use nalgebra::Point3;
 
 /// A curve, several, or a set of points.

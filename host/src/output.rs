@@ -6,7 +6,7 @@
 //! | `skeleton.ply` | its curve skeleton: points with `radius`, mm, and edges |
 //! | `boundary.ply` | its boundary as seen from the left: points and edges |
 //! | `report.json` | every figure ([`crate::report::numbers`]) |
-//! | `report.html` | all of it to look at, in one page ([`page`]), if that was asked for |
+//! | `report.html` | all of it to look at, in one page ([`Content`]), if that was asked for |
 //! | `pictures/*.png` | a picture a stage ([`pictures::NAMES`]), if the record kept rasters |
 //!
 //! Lengths are millimetres in the left camera's axes. Everything is made in a temporary folder inside the
@@ -19,7 +19,8 @@
 use crate::export::ExportError;
 use crate::export::ply;
 use crate::reconstruct::Reconstruction;
-use crate::report::{Run, numbers, page, pictures};
+use crate::report::page::Content;
+use crate::report::{Refused, Run, numbers, pictures};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{GrayImage, RgbImage};
 use rayon::prelude::*;
@@ -47,6 +48,22 @@ pub fn write(folder: &Path, run: &Run<'_>, page: bool) -> Result<Vec<u8>, Export
         }
     }
     result
+}
+
+/// Write the page of a refused pair into `folder`, which is created if it is missing; returns the page's path.
+///
+/// # Errors
+/// As [`write()`].
+pub fn write_refused(folder: &Path, refused: &Refused<'_>) -> Result<PathBuf, ExportError> {
+    create(folder)?;
+    let path = folder.join(PAGE);
+    write_together(&[(&path, Content::refused(refused, &title(folder)).html().into_bytes())])?;
+    Ok(path)
+}
+
+/// What a page about a folder is called.
+fn title(folder: &Path) -> String {
+    folder.file_name().map_or("Ossature".into(), |name| name.to_string_lossy().into_owned())
 }
 
 /// Whether a folder holds what a run left.
@@ -126,8 +143,8 @@ fn write_into(folder: &Path, run: &Run<'_>, page: bool) -> Result<Vec<u8>, Expor
     let report = numbers::json(run);
     names.push(stage.bytes("report.json", &report)?);
     if page {
-        let title = folder.file_name().map_or("Ossature".into(), |name| name.to_string_lossy());
-        names.push(stage.bytes(PAGE, page::html(run, &report, &title).as_bytes())?);
+        let title = title(folder);
+        names.push(stage.bytes(PAGE, Content::of(run, &report, &title).html().as_bytes())?);
     }
     let drawn = pictures::draw(run);
     if !drawn.is_empty() {

@@ -9,7 +9,9 @@ use host::mesh::Mesh;
 use host::mesh::read::{read, read_geometry};
 use host::shape::Shape;
 use nalgebra::{Point3, Vector3};
+use oracle::nurbs;
 use oracle::program::{host, within};
+use serde_json::Value;
 use std::path::Path;
 use std::process::Command;
 
@@ -124,6 +126,69 @@ fn a_skeleton_is_the_same_in_every_format() {
     }
 }
 
+/// The splines of a torus, whose branch is a ring, and of a capsule are the core's curves: a point of theirs, by the
+/// recursion of Cox and de Boor, is seen where the curve in the image runs, and as large.
+#[test]
+fn splines_are_the_cores_curves_in_space() {
+    for (shape, ring) in [("torus", true), ("capsule", false)] {
+        let folder = tempfile::tempdir().unwrap();
+        let [out, path] = ["out", "curves.json"].map(|name| within(folder.path(), name));
+        host(&["demo", shape, "--no-report", "--out", &out]).unwrap();
+        host(&["convert", &out, &path]).unwrap();
+        let json = |path: &Path| -> Value { serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap() };
+        let (report, document) = (json(&Path::new(&out).join("report.json")), json(Path::new(&path)));
+        assert_eq!((&document["unit"], &document["coordinates"][3]), (&"mm".into(), &"radius".into()));
+        let number = |value: &Value| value.as_f64().unwrap();
+        let camera = &report["calibration"];
+        let [f, offset] = ["rectified_focal_px", "disparity_offset_px"].map(|name| number(&camera[name]));
+        let axis = [0, 1].map(|k| number(&camera["rectified_axis_px"][k]));
+        let (splines, curves) =
+            (document["curves"].as_array().unwrap(), report["curves"]["left"].as_array().unwrap());
+        assert!(!splines.is_empty() && splines.len() == curves.len());
+        assert_eq!(splines.iter().any(|spline| spline["closed"] == true), ring, "{shape}");
+        for (spline, curve) in splines.iter().zip(curves) {
+            let list =
+                |name: &str| -> Vec<f64> { spline[name].as_array().unwrap().iter().map(number).collect() };
+            let (knots, weights, controls) = (list("knots"), list("weights"), &spline["controls"]);
+            assert_eq!(knots.len(), weights.len() + 4);
+            let image: Vec<([f64; 4], f64)> = curve["controls"]
+                .as_array()
+                .unwrap()
+                .iter()
+                .map(|c| {
+                    (
+                        ["u_px", "v_px", "radius_px", "disparity_px"].map(|name| number(&c[name])),
+                        number(&c["weight"]),
+                    )
+                })
+                .collect();
+            let end = knots[weights.len()];
+            for t in (0..=40).map(|k| f64::from(k) / 40.0 * end) {
+                let shares: Vec<f64> =
+                    weights.iter().enumerate().map(|(i, w)| w * nurbs::basis(&knots, i, 3, t)).collect();
+                let sum: f64 = shares.iter().sum();
+                let at = |axis: usize| -> f64 {
+                    shares
+                        .iter()
+                        .enumerate()
+                        .map(|(i, share)| share * number(&controls[i][axis]))
+                        .sum::<f64>()
+                        / sum
+                };
+                let [x, y, z, radius] = [0, 1, 2, 3].map(at);
+                let scale = f / z;
+                let baseline = number(&camera["baseline_mm"]);
+                let found =
+                    [axis[0] + x * scale, axis[1] + y * scale, radius * scale, baseline * scale - offset];
+                let truth = nurbs::evaluate(&image, ring, t);
+                for (a, b) in found.iter().zip(truth) {
+                    assert!((a - b).abs() < 1e-3, "{shape} at {t}: {found:?} is not {truth:?}");
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn points_without_edges_stay_points() {
     let folder = tempfile::tempdir().unwrap();
@@ -151,12 +216,46 @@ fn what_a_format_cannot_hold_is_refused_in_words() {
     for (input, output, told) in [
         (&mesh, "a.swc", "SWC holds skeletons alone"),
         (&curves, "a.stl", "STL holds triangles alone"),
-        (&mesh, "a.step", "must end in .ply, .stl, .obj, .glb or .swc"),
+        (&mesh, "a.json", "JSON holds NURBS alone"),
+        (&mesh, "a.step", "must end in .ply, .stl, .obj, .glb, .swc or .json"),
         (&mesh, "a", "must end in"),
     ] {
         let error = host(&["convert", input, &within(folder.path(), output)]).unwrap_err().to_string();
         assert!(error.contains(told), "{output}: {error}");
         assert!(!folder.path().join(output).exists());
+    }
+}
+
+#[test]
+fn a_report_without_curves_is_refused_in_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let [report, output] = ["report.json", "curves.json"].map(|name| within(folder.path(), name));
+    for (text, told) in [("{\"curves_mm\": null}", "no curves in space"), ("[", "is no report.json")] {
+        std::fs::write(&report, text).unwrap();
+        for input in [report.as_str(), folder.path().to_str().unwrap()] {
+            let error = host(&["convert", input, &output]).unwrap_err();
+            assert!(error.contains(told), "{error}");
+        }
+    }
+    assert!(!Path::new(&output).exists());
+}
+
+/// Names of files are bytes.
+#[cfg(unix)]
+#[test]
+fn a_file_of_any_name_is_written_and_told_of() {
+    use clap::Parser;
+    use std::ffi::OsString;
+    use std::os::unix::ffi::OsStringExt;
+    let folder = tempfile::tempdir().unwrap();
+    let source = folder.path().join(OsString::from_vec(b"shape\xff.ply".to_vec()));
+    let output = folder.path().join(OsString::from_vec(b"model\xfe.stl".to_vec()));
+    host::export::ply::write_mesh(&source, &shape(), &[]).unwrap();
+    for more in [&[][..], &["--json"]] {
+        let words = ["host", "convert"].into_iter().chain(more.iter().copied()).map(OsString::from);
+        let words = words.chain([source.clone().into(), output.clone().into()]);
+        host::command::Cli::try_parse_from(words).unwrap().run().unwrap();
+        assert_eq!(read(&output).unwrap().faces.len(), shape().faces.len());
     }
 }
 

@@ -28,7 +28,8 @@ mod within;
 
 use super::{Failure, note, say, say_json};
 use crate::output::write_together;
-use crate::report::pictures::eye::{self, Seen};
+use crate::report::layers::Seen;
+use crate::report::pictures::sheet;
 use crate::report::record::{Parts, Rasters};
 use crate::report::words::{parse_polarity, parse_rule, parse_threshold};
 use crate::source::picture::{self, Loaded};
@@ -154,16 +155,16 @@ fn make(args: &Args, image: &GrayImage) -> Result<Made, Failure> {
 }
 
 fn draw(stage: Stage, made: &Made) -> Option<RgbImage> {
-    let views = [Seen { name: "", parts: &made.parts, rasters: &made.rasters }];
+    let views = [Seen { name: "", parts: &made.parts, rasters: Some(&made.rasters) }];
     match stage {
-        Stage::Binarise | Stage::Clean | Stage::Boundary => eye::mask(&views),
-        Stage::Distance => eye::distance(&views),
-        Stage::Thinning => eye::thinned(&views),
-        Stage::Graph => eye::skeleton(&views),
-        Stage::Contour => eye::contour(&views),
-        Stage::Hull => eye::hull(&views),
-        Stage::Medial => eye::medial(&views, &made.balls),
-        Stage::Nurbs => eye::curves(&views),
+        Stage::Binarise | Stage::Clean | Stage::Boundary => sheet::mask(&views),
+        Stage::Distance => sheet::distance(&views),
+        Stage::Thinning => sheet::thinned(&views),
+        Stage::Graph => sheet::skeleton(&views),
+        Stage::Contour => sheet::contour(&views),
+        Stage::Hull => sheet::hull(&views),
+        Stage::Medial => sheet::medial(&views, &made.balls),
+        Stage::Nurbs => sheet::curves(&views),
     }
 }
 

@@ -17,7 +17,7 @@ use crate::output;
 use crate::reconstruct::{Options, Reconstruction, Refusal, Workspace, describe};
 use crate::report::record::Record;
 use crate::report::times::{self, Stage};
-use crate::report::{Run, words};
+use crate::report::{Refused, Run, words};
 use crate::source::serial::inbox::{Inbox, Message, Pair};
 
 /// All that a model comes from.
@@ -43,12 +43,20 @@ pub(super) struct Place<'a> {
 }
 
 impl Place<'_> {
-    /// That a pair is refused; the model of an earlier one must not stand for it.
-    fn refused(&self, refusal: Refusal) -> Failure {
-        match output::clear(self.folder) {
-            Ok(()) => refusal.into(),
-            Err(error) => format!("{refusal}; an earlier model stays: {}", words_of(&error)).into(),
+    /// That a pair is refused, with a page about it if that is wanted. The model of an earlier one must not stand for
+    /// it.
+    fn refused(&self, options: &Options, record: &Record, refusal: Refusal) -> Failure {
+        let mut words = words_of(&refusal);
+        if let Err(error) = output::clear(self.folder) {
+            words += &format!("; an earlier model stays: {}", words_of(&error));
+        } else if self.page {
+            words +=
+                &match output::write_refused(self.folder, &Refused { options, record, refusal: &refusal }) {
+                    Ok(page) => format!("; {} shows it", page.display()),
+                    Err(failure) => format!("; and {}", words_of(&failure)),
+                };
         }
+        words.into()
     }
 }
 
@@ -86,8 +94,13 @@ pub(super) fn make_and_keep(
     let start = Instant::now();
     let Order { images, calibration, options, truth, .. } = order;
     let mut record = if order.pictures { Record::new() } else { Record::figures_only() };
-    let made = workspace.reconstruct(images.each_ref(), calibration, options, &mut record);
-    let made = made.map_err(|refusal| order.place.refused(refusal))?;
+    let made = match workspace.reconstruct(images.each_ref(), calibration, options, &mut record) {
+        Ok(made) => made,
+        Err(refusal) => {
+            record.complete(images.each_ref(), options);
+            return Err(order.place.refused(options, &record, refusal));
+        }
+    };
     let run = Run { calibration, options, reconstruction: &made, record: &record, truth };
     Ok((Model::written(order.place, &run, start)?, made))
 }
@@ -102,7 +115,8 @@ pub(super) fn make_as_device(
 ) -> Result<Model, Failure> {
     let start = Instant::now();
     let described = describe(left, right, calibration, options);
-    let (device, bytes) = described.map_err(|refusal| place.refused(refusal))?;
+    let (device, bytes) =
+        described.map_err(|refusal| place.refused(options, &Record::figures_only(), refusal))?;
     let mut inbox = Inbox::new()?;
     let mut buffer = vec![0; bytes.len()];
     let mut decoder = Decoder::new(&mut buffer);
@@ -123,13 +137,14 @@ pub(super) fn receive(
     workspace: &mut Workspace,
 ) -> Result<Model, Failure> {
     let start = Instant::now();
-    let outcome = pair.result.map_err(|finding| place.refused(finding.into()))?;
     let mut record = Record::figures_only();
-    for (k, eye) in record.eyes.iter_mut().enumerate() {
-        (eye.parts.level, eye.parts.area) = (pair.levels[k], outcome.areas[k] as usize);
-    }
-    let made = workspace.reconstruct_shape((&mut inbox.memory(), outcome), model, options, &mut record);
-    let made = made.map_err(|refusal| place.refused(refusal))?;
+    let made = pair.result.map_err(Refusal::from).and_then(|outcome| {
+        for (k, eye) in record.eyes.iter_mut().enumerate() {
+            (eye.parts.level, eye.parts.area) = (pair.levels[k], outcome.areas[k] as usize);
+        }
+        workspace.reconstruct_shape((&mut inbox.memory(), outcome), model, options, &mut record)
+    });
+    let made = made.map_err(|refusal| place.refused(options, &record, refusal))?;
     let calibration = &model.into();
     let run = Run { calibration, options, reconstruction: &made, record: &record, truth: None };
     let told = Model::written(place, &run, start)?;

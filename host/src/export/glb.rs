@@ -13,6 +13,8 @@ use super::{ExportError, write_bytes};
 use crate::curves::Curves;
 use crate::mesh::Mesh;
 
+/// The format's axes, as a model stands in them.
+const AXES: &str = "x right, y up, z towards the left camera";
 /// Component types and targets of the specification.
 const UNSIGNED_INT: u32 = 5125;
 const FLOAT: u32 = 5126;
@@ -132,7 +134,7 @@ impl Buffer {
     /// Writes the file: a header, the JSON, the binary part; each padded to four bytes.
     fn write(self, path: &Path, name: &str, primitive: &Value) -> Result<(), ExportError> {
         let root = json!({
-            "asset": { "version": "2.0", "generator": "Ossature" },
+            "asset": { "version": "2.0", "generator": "Ossature", "extras": { "unit": "m", "axes": AXES } },
             "scene": 0,
             "scenes": [{ "nodes": [0] }],
             "nodes": [{ "mesh": 0, "name": name }],

@@ -3,12 +3,13 @@
 //! * [`ply`]: meshes (`model.ply`), point clouds and curves (`boundary.ply`, `skeleton.ply`) as binary
 //!   little-endian PLY, which every mesh viewer reads.
 //! * [`stl`]: meshes for printing; [`obj`]: meshes and curves for modelling; [`glb`]: both for showing.
-//! * [`swc`]: skeletons for those who study trees and neurons.
+//! * [`swc`]: skeletons for those who study trees and neurons; [`json`]: their branches as NURBS.
 //!
 //! Lengths are millimetres in the left camera's axes, but in [`glb`], which says metres. A file is written beside its
 //! final name and renamed when it is complete, so that nothing half-written ever stands under that name.
 
 pub mod glb;
+pub mod json;
 pub mod obj;
 pub mod ply;
 pub mod stl;
@@ -21,7 +22,11 @@ use std::{
 
 use thiserror::Error;
 
+use crate::curves::spline::Spline;
 use crate::geometry::Geometry;
+
+/// The axes of everything but [`glb`].
+const AXES: &str = "left camera: x right, y down, z forward";
 
 /// What a file in millimetres says of itself, in whatever place its format has for it.
 const TITLE: &str = "Ossature; unit mm; axes of the left camera: x right, y down, z forward";
@@ -59,19 +64,36 @@ pub fn write(path: &Path, geometry: &Geometry) -> Result<(), ExportError> {
         (Some("ply"), Geometry::Mesh(mesh)) => ply::write_mesh(path, mesh, &[TITLE]),
         (Some("ply"), Geometry::Curves(curves)) => ply::write_curves(path, curves, &[TITLE]),
         (Some("stl"), Geometry::Mesh(mesh)) => stl::write_mesh(path, mesh),
-        (Some("stl"), Geometry::Curves(_)) => {
-            refuse("STL holds triangles alone; curves go into .ply, .obj, .glb or .swc")
-        }
         (Some("obj"), Geometry::Mesh(mesh)) => obj::write_mesh(path, mesh),
         (Some("obj"), Geometry::Curves(curves)) => obj::write_curves(path, curves),
         (Some("glb"), Geometry::Mesh(mesh)) => glb::write_mesh(path, mesh),
         (Some("glb"), Geometry::Curves(curves)) => glb::write_curves(path, curves),
         (Some("swc"), Geometry::Curves(curves)) => swc::write_curves(path, curves),
-        (Some("swc"), Geometry::Mesh(_)) => {
-            refuse("SWC holds skeletons alone; meshes go into .ply, .stl, .obj or .glb")
+        (Some("stl"), _) => refuse("STL holds triangles alone; curves go into .ply, .obj, .glb or .swc"),
+        (Some("swc"), _) => refuse("SWC holds skeletons alone; meshes go into .ply, .stl, .obj or .glb"),
+        (Some("json"), _) => {
+            refuse("JSON holds NURBS alone, which a folder of results has, or its report.json")
         }
-        _ => refuse("its name must end in .ply, .stl, .obj, .glb or .swc"),
+        _ => refuse("its name must end in .ply, .stl, .obj, .glb, .swc or .json"),
     }
+}
+
+/// Writes NURBS, which JSON alone holds with their radii.
+///
+/// # Errors
+///
+/// If the extension is not `json`, or the file cannot be written.
+pub fn write_splines(path: &Path, curves: &[Spline]) -> Result<(), ExportError> {
+    if !has_extension(path, "json") {
+        let what = "NURBS go into .json alone".to_owned();
+        return Err(ExportError::Content { path: path.to_path_buf(), what });
+    }
+    json::write_splines(path, curves)
+}
+
+/// Whether a file's name ends so, in whatever case.
+pub(crate) fn has_extension(path: &Path, extension: &str) -> bool {
+    path.extension().is_some_and(|other| other.eq_ignore_ascii_case(extension))
 }
 
 /// Creates or replaces the file `path` by `bytes`, all or nothing.

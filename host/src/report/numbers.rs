@@ -11,6 +11,8 @@ mod matching;
 
 use super::times::{Part, stages};
 use super::{Run, words};
+use crate::curves::spline::Spline;
+use crate::reconstruct::{Mode, Refusal};
 use choices::{Calibration, Choices, Images};
 use curves::Curve;
 use eye::EyeFigures;
@@ -38,6 +40,8 @@ struct Report {
     model: Model,
     /// The compact description: the skeleton's branches as NURBS.
     curves: Eyes<Vec<Curve>>,
+    /// Those of the left view in space; `null` in paper mode, which describes each view by itself.
+    curves_mm: Option<Vec<Spline>>,
     times_ms: Times,
 }
 
@@ -55,7 +59,7 @@ impl<T> Eyes<T> {
 
 /// A finding.
 #[derive(Serialize)]
-struct Gate {
+pub(super) struct Gate {
     name: &'static str,
     /// `warning`, or `refusal` where only the paper's mode goes on.
     severity: &'static str,
@@ -63,12 +67,17 @@ struct Gate {
 }
 
 impl Gate {
-    fn of(finding: &Finding) -> Self {
+    pub(super) fn of(finding: &Finding) -> Self {
         Self {
             name: words::name(finding),
             severity: if finding.refuses() { "refusal" } else { "warning" },
             sentence: words::sentence(finding),
         }
+    }
+
+    /// What is no finding of the core, but leaves no model either.
+    pub(super) fn refusal(refusal: &Refusal) -> Self {
+        Self { name: "refused", severity: "refusal", sentence: refusal.to_string() }
     }
 }
 
@@ -145,6 +154,12 @@ impl Times {
     }
 }
 
+/// The left view's curves in space.
+fn splines(run: &Run<'_>) -> Vec<Spline> {
+    let (left, camera) = (&run.record.eyes[0].parts, &run.reconstruction.camera);
+    left.branches.iter().filter_map(|branch| Spline::of(branch, &left.controls, camera)).collect()
+}
+
 /// `report.json` of a run.
 #[must_use]
 pub fn json(run: &Run<'_>) -> Vec<u8> {
@@ -161,6 +176,7 @@ pub fn json(run: &Run<'_>) -> Vec<u8> {
         gates: run.reconstruction.outcome.findings.iter().map(Gate::of).collect(),
         model: Model::of(run),
         curves: Eyes::of([Curve::all(&eyes[0].parts), Curve::all(&eyes[1].parts)]),
+        curves_mm: (run.options.mode == Mode::Default).then(|| splines(run)),
         times_ms: Times::of(run),
     };
     // Names are strings and numbers finite or null: nothing here can fail to be JSON.

@@ -5,11 +5,12 @@
 //! * **Cost**: a copy of each list, and with [`Record::new`] of six rasters an eye; [`Record::figures_only`]
 //!   leaves the rasters out. Copying is not timed.
 
+use crate::reconstruct::Options;
 use image::{GrayImage, ImageBuffer, Luma};
-use shared::bitmap::{Bitmap, Grey, PixelBox, Plane};
+use shared::bitmap::{Bitmap, Grey, PixelBox, Plane, Size};
 use shared::pipeline::{Branch, Observer, Product, Side};
 use shared::point::{Pixel, PixelPoint};
-use shared::stage::binarise::Tone;
+use shared::stage::binarise::{self, Tone};
 use shared::stage::clean::Components;
 use shared::stage::contour::{ContourLoop, ContourPoint};
 use shared::stage::correspond::{CutMatch, VertexMatch};
@@ -149,6 +150,27 @@ impl Record {
     #[must_use]
     pub fn figures_only() -> Self {
         Self { eyes: Default::default(), pair: Matches::default(), laps: Vec::new(), last: Instant::now() }
+    }
+
+    /// Adds to the record of a refused pair the views that the core did not come to, as they came, and what would be
+    /// taken for the object in them.
+    pub fn complete(&mut self, images: [&GrayImage; 2], options: &Options) {
+        for (eye, image) in self.eyes.iter_mut().zip(images) {
+            let (Some(rasters), None) = (&mut eye.rasters, eye.parts.tone) else { continue };
+            rasters.grey = image.clone();
+            let (width, height) = (image.width() as usize, image.height() as usize);
+            let grey = Size::new(width, height).and_then(|size| Grey::new(size, width, image.as_raw()));
+            // What is larger than the core takes is shown as it is.
+            let Ok(grey) = grey else { continue };
+            let histogram = binarise::histogram(grey);
+            let level = options.threshold.level(&histogram);
+            let tone = options.polarity.tone(grey, level);
+            let object = |x: u8| u8::MAX * u8::from((x > level) == (tone == Tone::Bright));
+            rasters.mask = GrayImage::from_fn(image.width(), image.height(), |u, v| {
+                Luma([object(image.get_pixel(u, v).0[0])])
+            });
+            (eye.parts.histogram, eye.parts.level, eye.parts.tone) = (histogram.to_vec(), level, Some(tone));
+        }
     }
 }
 

@@ -1,6 +1,8 @@
 //! How long the stages of a run took.
 
 use super::Run;
+use super::record::{Lap, Record};
+use super::words::view;
 use shared::pipeline::Side;
 use std::time::Duration;
 
@@ -13,6 +15,18 @@ pub enum Part {
     Pair,
     /// What comes before and after the core.
     Host,
+}
+
+impl Part {
+    /// What it is called.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Eye(side) => view(&side),
+            Self::Pair => "pair",
+            Self::Host => "host",
+        }
+    }
 }
 
 /// A stage of a run.
@@ -37,10 +51,17 @@ pub fn stages(run: &Run<'_>) -> Vec<Stage> {
     // The record's clock runs since before the images were rectified, if they were.
     let mut before = host[..core].iter().map(|stage| stage.time).sum();
     let mut stages = host[..core].to_vec();
-    stages.extend(run.record.laps.iter().map(|lap| {
-        let time = lap.time.saturating_sub(std::mem::take(&mut before));
-        Stage { part: lap.side.map_or(Part::Pair, Part::Eye), name: lap.stage, time }
+    stages.extend(of_core(run.record).into_iter().map(|stage| {
+        let time = stage.time.saturating_sub(std::mem::take(&mut before));
+        Stage { time, ..stage }
     }));
     stages.extend(&host[core..]);
     stages
+}
+
+/// The core's stages that a record saw; the first holds what came before it.
+pub fn of_core(record: &Record) -> Vec<Stage> {
+    let stage =
+        |lap: &Lap| Stage { part: lap.side.map_or(Part::Pair, Part::Eye), name: lap.stage, time: lap.time };
+    record.laps.iter().map(stage).collect()
 }

@@ -1,6 +1,7 @@
 //! Independent oracles: naive twins, shapes with known truth, a mesh checker.
 
 pub mod board;
+pub mod browser;
 pub mod camera;
 pub mod cases;
 pub mod core;

@@ -1,13 +1,12 @@
 //! The skeleton's branches as NURBS: with these a reader can rebuild every ball.
 
 use super::super::record::Parts;
+use crate::curves::spline::{DEGREE, knots};
 use crate::stage::balls::px;
 use serde::Serialize;
 use shared::fixed::ONE;
 use shared::pipeline::Branch;
 use shared::stage::nurbs::Control;
-
-const DEGREE: usize = 3;
 
 /// A rational B-spline in (u, v, radius, disparity), px.
 ///
@@ -63,14 +62,4 @@ impl Curve {
             controls: curve.controls().iter().map(ControlPoint::of).collect(),
         })
     }
-}
-
-/// Clamped uniform knots of an open curve, periodic uniform ones of a closed curve.
-fn knots(controls: usize, closed: bool) -> Vec<i32> {
-    let (controls, degree) = (controls as i32, DEGREE as i32);
-    if closed {
-        return (-degree..=controls + degree).collect();
-    }
-    let spans = controls - degree;
-    (-degree..=spans + degree).map(|knot| knot.clamp(0, spans)).collect()
 }

@@ -16,7 +16,7 @@ fn names(value: &Value) -> Vec<&str> {
 fn the_fields_are_these() {
     let report = report(Mode::Default);
     let top = ["format", "format_version", "version", "options", "images", "calibration", "eyes", "matching"];
-    assert_eq!(names(&report), [&top[..], &["gates", "model", "curves", "times_ms"]].concat());
+    assert_eq!(names(&report), [&top[..], &["gates", "model", "curves", "curves_mm", "times_ms"]].concat());
     let matching = ["right_area_over_left", "vertical_offset", "invariants", "disparity", "rows", "paper"];
     assert_eq!(names(&report["matching"]), matching);
     assert_eq!(report["options"]["mode"], "default");
@@ -55,6 +55,6 @@ fn only_times_differ_between_runs() {
 fn the_papers_mode_has_its_own_figures() {
     let report = report(Mode::Paper { omega: 3 });
     assert_eq!(report["options"]["omega"], 3);
-    assert!(report["matching"]["rows"].is_null());
+    assert!(report["matching"]["rows"].is_null() && report["curves_mm"].is_null());
     assert!(report["matching"]["paper"]["boundary_pairs"].as_u64() > Some(0));
 }

@@ -46,8 +46,8 @@ struct Surface {
     i: Bulk,
     j: Bulk,
     k: Bulk,
-    /// Distance of each vertex from the truth, mm, where that is known.
-    error: Option<Bulk>,
+    /// Distance of each vertex from the truth, mm, where that is known, and what all but one in a hundred keep below.
+    error: Option<(Bulk, f64)>,
 }
 
 impl Surface {
@@ -57,7 +57,11 @@ impl Surface {
         let error = truth.map(|truth| {
             let truth = Bvh::new(truth);
             let errors: Vec<f64> = mesh.vertices.par_iter().map(|p| truth.distance(p)).collect();
-            Bulk::floats(errors.into_iter())
+            let mut order = errors.clone();
+            let rank = order.len() * 99 / 100;
+            let most =
+                order.get_mut(rank).is_some().then(|| *order.select_nth_unstable_by(rank, f64::total_cmp).1);
+            (Bulk::floats(errors.into_iter()), most.unwrap_or_default())
         });
         Self { x: axis(0), y: axis(1), z: axis(2), i: corner(0), j: corner(1), k: corner(2), error }
     }

@@ -1,143 +1,143 @@
-//! Both views as SVG, a layer a stage, cut to the object; a pixel is a unit.
+//! Both views for the script: a layer a stage, each as SVG in pixels of the image.
 
 use super::escaped;
-use crate::reconstruct::Mode;
-use crate::report::Run;
-use crate::report::pictures::colour::{APART, Colour, shade};
-use crate::report::record::{Eye, Parts, Rasters};
-use crate::report::words::view;
-use crate::stage::balls::px;
+use crate::report::layers::colour::{Colour, RIM};
+use crate::report::layers::frame::Frame;
+use crate::report::layers::pair::Pair;
+use crate::report::layers::{Layer, Mark, Place, eye};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{Rgba, RgbaImage};
-use shared::pipeline::Side;
-use shared::point::PixelPoint;
-use shared::stage::graph::NodeKind;
+use serde::Serialize;
+use shared::stage::distance::DISTANCE_PX;
 use std::fmt::Write as _;
 
-/// The layers, from the lowest: name, what it is called, and whether it is shown at first.
-const LAYERS: [(&str, &str, bool); 9] = [
-    ("grey", "image", true),
-    ("mask", "mask", false),
-    ("distance", "distance", false),
-    ("pruned", "pruned branches", false),
-    ("contour", "contour", true),
-    ("skeleton", "skeleton", true),
-    ("curves", "curves and balls", false),
-    ("hull", "hull, matched", false),
-    ("matches", "correspondence", false),
+/// The layers, from the lowest: name, and what it is called.
+const LAYERS: [(&str, &str); 9] = [
+    ("grey", "image"),
+    ("mask", "mask"),
+    ("distance", "distance"),
+    ("pruned", "pruned branches"),
+    ("contour", "contour"),
+    ("skeleton", "skeleton"),
+    ("curves", "curves and balls"),
+    ("hull", "hull, matched"),
+    ("matches", "correspondence"),
 ];
 
-/// Matched points are drawn in about so many rows of the object.
-const ROWS: i32 = 40;
+/// From a vertex to the middle of its letter, and the letter's size: parts of the frame's width.
+const LETTER: f64 = 0.035;
 
-/// The part of a view that is shown, px.
-#[derive(Clone, Copy)]
-struct Frame {
-    min: [u32; 2],
-    size: [u32; 2],
+/// Both views, and the layers that either has.
+#[derive(Serialize)]
+pub(super) struct Views {
+    layers: Vec<Switch>,
+    figures: Vec<Figure>,
 }
 
-impl Frame {
-    /// The object's box and a margin around it, within the picture where its size is known.
-    fn around(eye: &Eye) -> Option<Self> {
-        let inside =
-            eye.parts.bounds.map(|b| [[b.min.u, b.max.u], [b.min.v, b.max.v]].map(|s| s.map(u32::from)));
-        let contour = || {
-            let span = |of: fn(PixelPoint) -> i32| {
-                let places = || eye.parts.contour.iter().map(|p| of(p.at).max(0) as u32 >> 8);
-                Some([places().min()?, places().max()?])
-            };
-            Some([span(|p| p.u)?, span(|p| p.v)?])
-        };
-        let spans = inside.or_else(contour)?;
-        let margin = spans.iter().map(|[low, high]| high - low).max().unwrap_or(0) / 16 + 4;
-        let limit = eye.rasters.as_ref().map_or([u32::MAX; 2], |r| [r.grey.width(), r.grey.height()]);
-        let min = spans.map(|[low, _]| low.saturating_sub(margin));
-        let end = [0, 1].map(|axis| (spans[axis][1] + margin + 1).min(limit[axis]));
-        Some(Self { min, size: [0, 1].map(|axis| end[axis] - min[axis]) })
-    }
+/// A layer to be switched on and off.
+#[derive(Serialize)]
+struct Switch {
+    name: &'static str,
+    title: &'static str,
+    /// What its colours mean.
+    caption: String,
+    /// Whether it is shown at first.
+    shown: bool,
 }
 
-/// The switches of the layers that either view has, and both views.
-pub(super) fn both(run: &Run<'_>) -> (String, String) {
-    let mut present = [false; LAYERS.len()];
-    let mut html = String::new();
-    for (side, eye) in [Side::Left, Side::Right].into_iter().zip(&run.record.eyes) {
-        let Some(frame) = Frame::around(eye) else { continue };
-        let ([u, v], [width, height]) = (frame.min, frame.size);
-        let name = view(&side);
-        let (x, y) = (f64::from(u) - 0.5, f64::from(v) - 0.5);
-        // Writing to a string does not fail.
-        let _ = write!(
-            html,
-            "<figure><svg viewBox=\"{x} {y} {width} {height}\" role=\"img\" aria-label=\"the {name} view\">"
-        );
-        for (k, (layer, _, shown)) in LAYERS.iter().enumerate() {
-            let content = content(layer, run, side, eye, frame).filter(|content| !content.is_empty());
-            if let Some(content) = content {
-                let hidden = if *shown { "" } else { " style=\"display:none\"" };
-                let _ = write!(html, "<g class=\"layer {layer}\"{hidden}>{content}</g>");
-                present[k] = true;
+/// A view.
+#[derive(Serialize)]
+struct Figure {
+    name: &'static str,
+    /// Left, top, width and height of what is shown.
+    frame: [f64; 4],
+    /// Names of its layers and what is in them, the lowest first.
+    layers: Vec<(&'static str, String)>,
+}
+
+impl Views {
+    /// The views of a pair in their frames, of which the layers `shown` are there to be seen at first.
+    pub(super) fn of(pair: &Pair<'_>, frames: Vec<Frame>, shown: &[&str]) -> Self {
+        let matched = pair.matched();
+        let widest = eye::widest(&pair.views);
+        let layer = |name: &str, k: usize| {
+            let view = &pair.views[k];
+            match name {
+                "grey" => eye::grey(view, 1.0),
+                "mask" => eye::mask(view),
+                "distance" => eye::distance(view, widest),
+                "pruned" => eye::pruned(view),
+                "contour" => Some(eye::contour(view.parts)),
+                "skeleton" => Some(eye::skeleton(view.parts)),
+                "curves" => Some(eye::curves(view.parts)),
+                "hull" => Some(pair.hull(k)),
+                _ => Some(matched.layer(k)),
             }
-        }
-        let _ = write!(html, "</svg><figcaption>{name}</figcaption></figure>");
+        };
+        let caption = |name: &str| match name {
+            "mask" => "white: the object; orange: its boundary pixels".into(),
+            "distance" => format!("dark: 0 px; yellow: {:.1} px", f64::from(widest) / f64::from(DISTANCE_PX)),
+            "pruned" => "red: what pruning took away".into(),
+            "contour" => "orange; red where the image's border cuts the object off".into(),
+            "skeleton" => "a colour a branch; white: ends; orange: junctions".into(),
+            "curves" => "white: control points; circles: balls".into(),
+            "hull" => "a letter marks the same vertex in both views".into(),
+            "matches" => matched.caption(),
+            _ => String::new(),
+        };
+        let figure = |(k, frame): (usize, Frame)| {
+            let content = |(name, _): (&'static str, &str)| {
+                let svg = svg(&layer(name, k)?, frame);
+                (!svg.is_empty()).then_some((name, svg))
+            };
+            Figure {
+                name: pair.views[k].name,
+                frame: [
+                    f64::from(frame.first[0]) - 0.5,
+                    f64::from(frame.first[1]) - 0.5,
+                    frame.size[0].into(),
+                    frame.size[1].into(),
+                ],
+                layers: LAYERS.into_iter().filter_map(content).collect(),
+            }
+        };
+        let figures: Vec<_> = frames.into_iter().enumerate().map(figure).collect();
+        let there = |name| figures.iter().any(|f| f.layers.iter().any(|(other, _)| *other == name));
+        let switch =
+            |(name, title)| Switch { name, title, caption: caption(name), shown: shown.contains(&name) };
+        let layers = LAYERS.into_iter().filter(|(name, _)| there(*name)).map(switch).collect();
+        Self { layers, figures: figures.into_iter().filter(|figure| !figure.layers.is_empty()).collect() }
     }
-    let switch = |(layer, called, shown): &(&str, &str, bool)| {
-        let checked = if *shown { " checked" } else { "" };
-        format!("<label><input type=\"checkbox\" data-layer=\"{layer}\"{checked}>{}</label>", escaped(called))
-    };
-    let switches = LAYERS.iter().zip(present).filter(|(_, there)| *there).map(|(layer, _)| switch(layer));
-    (switches.collect(), html)
 }
 
-fn content(layer: &str, run: &Run<'_>, side: Side, eye: &Eye, frame: Frame) -> Option<String> {
-    let parts = &eye.parts;
+/// A layer's elements.
+fn svg(layer: &Layer<'_>, frame: Frame) -> String {
     match layer {
-        "contour" => Some(contour(parts)),
-        "skeleton" => Some(skeleton(parts)),
-        "curves" => Some(curves(parts)),
-        "hull" => Some(hull(run, side, parts)),
-        "matches" => Some(matches(run, side)),
-        _ => raster(layer, eye.rasters.as_ref()?, parts, frame),
+        Layer::Raster(colour) => picture(frame, colour),
+        Layer::Marks(marks) => marks.iter().map(|mark| element(mark, frame)).collect(),
     }
 }
 
-/// The rasters, each with what is not in it transparent.
-fn raster(layer: &str, rasters: &Rasters, parts: &Parts, frame: Frame) -> Option<String> {
-    let opaque = |[r, g, b]: Colour| Rgba([r, g, b, u8::MAX]);
-    let set = |image: &image::GrayImage, u, v| image.get_pixel(u, v).0[0] != 0;
-    Some(match layer {
-        "grey" => picture(frame, |u, v| Some(opaque([rasters.grey.get_pixel(u, v).0[0]; 3]))),
-        "mask" => picture(frame, |u, v| {
-            let colour = if set(&rasters.boundary, u, v) { [255, 159, 28] } else { [225, 225, 222] };
-            set(&rasters.mask, u, v).then_some(opaque(colour))
-        }),
-        "distance" => picture(frame, |u, v| {
-            let distance = f64::from(rasters.distance.get_pixel(u, v).0[0]);
-            (distance > 0.0).then(|| opaque(shade(distance / f64::from(parts.widest.max(1)))))
-        }),
-        "pruned" => picture(frame, |u, v| {
-            let gone = set(&rasters.skeleton, u, v) && !set(&rasters.pruned, u, v);
-            gone.then_some(opaque([255, 60, 60]))
-        }),
-        _ => return None,
-    })
-}
-
-/// An image element of the pixels of a frame.
-fn picture(frame: Frame, colour: impl Fn(u32, u32) -> Option<Rgba<u8>>) -> String {
-    let ([u0, v0], [width, height]) = (frame.min, frame.size);
-    let clear = Rgba([0; 4]);
-    let image = RgbaImage::from_fn(width, height, |u, v| colour(u0 + u, v0 + v).unwrap_or(clear));
+/// An image element of the pixels of a frame; what has no colour is transparent.
+fn picture(frame: Frame, colour: &dyn Fn(u32, u32) -> Option<Colour>) -> String {
+    let [width, height] = frame.size;
+    let at = |k: usize, x: u32| u32::try_from(frame.first[k] + x as i32).ok();
+    let image = RgbaImage::from_fn(width, height, |x, y| {
+        let colour = at(0, x).zip(at(1, y)).and_then(|(u, v)| colour(u, v));
+        colour.map_or(Rgba([0; 4]), |[r, g, b]| Rgba([r, g, b, u8::MAX]))
+    });
+    if image.pixels().all(|pixel| pixel.0[3] == 0) {
+        return String::new();
+    }
     let mut bytes = Vec::new();
-    let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Default, FilterType::Adaptive);
+    let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive);
     // Writing to a vector does not fail; were it to, the layer would be missing.
     if image.write_with_encoder(encoder).is_err() {
         return String::new();
     }
-    let (x, y) = (f64::from(u0) - 0.5, f64::from(v0) - 0.5);
+    let [x, y] = frame.first.map(|first| f64::from(first) - 0.5);
     format!(
         "<image x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" \
          href=\"data:image/png;base64,{}\"/>",
@@ -145,113 +145,52 @@ fn picture(frame: Frame, colour: impl Fn(u32, u32) -> Option<Rgba<u8>>) -> Strin
     )
 }
 
-/// A path through points, px.
-fn path(points: impl Iterator<Item = [f64; 2]>, closed: bool, class: &str, colour: Option<Colour>) -> String {
-    let mut d = String::new();
-    for (k, [x, y]) in points.enumerate() {
-        let _ = write!(d, "{}{x:.2} {y:.2}", if k == 0 { 'M' } else { 'L' });
+/// A mark's element; the widths of its lines are those of the screen, which is the style's doing.
+fn element(mark: &Mark, frame: Frame) -> String {
+    let width = f64::from(frame.size[0]);
+    match mark {
+        Mark::Lines { points, closed, width, colour } => {
+            let mut d = String::new();
+            for (k, p) in points.iter().enumerate() {
+                // Writing to a string does not fail.
+                let _ = write!(d, "{}{:.2} {:.2}", if k == 0 { 'M' } else { 'L' }, p.x, p.y);
+            }
+            if points.len() < 2 {
+                return String::new();
+            }
+            path(&d, if *closed { "Z" } else { "" }, *width, *colour)
+        }
+        Mark::Ring { centre, radius, colour } => format!(
+            "<circle cx=\"{:.2}\" cy=\"{:.2}\" r=\"{radius:.2}\" stroke=\"{}\"/>",
+            centre.x,
+            centre.y,
+            css(*colour)
+        ),
+        Mark::Dots { places, radius, colour, set_off } => {
+            // Lines of no length with round ends are discs whose size is the screen's.
+            let of = |p: &Place| format!("M{:.2} {:.2}h0", p.x, p.y);
+            let d: String = places.iter().map(of).collect();
+            let rim = if *set_off { path(&d, "", 2.0 * radius + 3.0, RIM) } else { String::new() };
+            rim + &path(&d, "", 2.0 * radius, *colour)
+        }
+        Mark::Letter { at, away, letter, colour } => {
+            let at = at + away * (LETTER * width);
+            format!(
+                "<text x=\"{:.2}\" y=\"{:.2}\" font-size=\"{:.2}\" fill=\"{}\">{}</text>",
+                at.x,
+                at.y,
+                LETTER * width,
+                css(*colour),
+                escaped(&letter.to_string())
+            )
+        }
     }
-    if d.is_empty() {
-        return d;
-    }
-    let stroke = colour.map_or(String::new(), |colour| format!(" stroke=\"{}\"", css(colour)));
-    format!("<path class=\"{class}\"{stroke} d=\"{d}{}\"/>", if closed { "Z" } else { "" })
 }
 
-fn circle([x, y]: [f64; 2], radius: f64, class: &str, colour: Colour) -> String {
-    format!(
-        "<circle class=\"{class}\" cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"{radius:.2}\" stroke=\"{0}\" fill=\"{0}\"/>",
-        css(colour)
-    )
+fn path(d: &str, end: &str, width: f64, colour: Colour) -> String {
+    format!("<path stroke=\"{}\" stroke-width=\"{width}\" d=\"{d}{end}\"/>", css(colour))
 }
 
 fn css([r, g, b]: Colour) -> String {
     format!("#{r:02x}{g:02x}{b:02x}")
-}
-
-fn at(p: PixelPoint) -> [f64; 2] {
-    [px(p.u), px(p.v)]
-}
-
-fn contour(parts: &Parts) -> String {
-    let of = |l: &shared::stage::contour::ContourLoop| {
-        path(l.range().map(|i| at(parts.contour[i].at)), true, "line", Some([255, 159, 28]))
-    };
-    parts.loops.iter().map(of).collect()
-}
-
-fn skeleton(parts: &Parts) -> String {
-    let branch = |(k, (edge, pixels)): (usize, &(shared::stage::graph::Edge, Vec<shared::point::Pixel>))| {
-        let places = pixels.iter().map(|p| [f64::from(p.u), f64::from(p.v)]);
-        path(places, edge.closed, "line thick", Some(APART[k % APART.len()]))
-    };
-    let mut html: String = parts.edges.iter().enumerate().map(branch).collect();
-    for node in parts.nodes.iter().filter(|node| node.kind != NodeKind::Loop) {
-        let colour = if node.kind == NodeKind::Junction { [255, 159, 28] } else { [255; 3] };
-        html += &circle(at(node.position), 1.5, "dot", colour);
-    }
-    html
-}
-
-fn curves(parts: &Parts) -> String {
-    let mut html = String::new();
-    let curves = parts.branches.iter().filter_map(|branch| branch.curve(&parts.controls));
-    for (k, curve) in curves.enumerate() {
-        let colour = APART[k % APART.len()];
-        let balls: Vec<_> = (0..=(curve.end() >> 16) * 8).map(|k| curve.evaluate(k << 13)).collect();
-        for ball in balls.iter().step_by(8) {
-            html += &circle(at(ball.at()), px(ball.rho), "ring", colour);
-        }
-        html += &path(balls.iter().map(|ball| at(ball.at())), false, "line thick", Some(colour));
-        for control in curve.controls() {
-            html += &circle(at(control.ball.at()), 1.2, "dot", [255; 3]);
-        }
-    }
-    html
-}
-
-/// By how much the rows of a view were moved before they were matched, 1/256 px.
-fn moved(run: &Run<'_>, side: Side) -> i32 {
-    match (run.options.mode, side) {
-        (Mode::Default, Side::Right) => run.reconstruction.outcome.vertical_offset,
-        _ => 0,
-    }
-}
-
-fn hull(run: &Run<'_>, side: Side, parts: &Parts) -> String {
-    let offset = moved(run, side);
-    let back = |p: &PixelPoint| at(PixelPoint { v: p.v + offset, ..*p });
-    let mut html = path(parts.hull.iter().map(back), true, "line faint", Some([190, 190, 196]));
-    if let Some(cuts) = &run.record.pair.cuts {
-        let own = if side == Side::Left { &cuts.left } else { &cuts.right };
-        html += &path(own.iter().map(back), true, "line", Some([255, 159, 28]));
-        for (k, p) in own.iter().enumerate() {
-            let [x, y] = back(p);
-            html += &circle([x, y], 2.0, "dot", APART[k % APART.len()]);
-            let letter = char::from(b'A' + (k % 26) as u8);
-            let _ = write!(html, "<text x=\"{:.2}\" y=\"{:.2}\">{letter}</text>", x + 3.0, y - 3.0);
-        }
-    }
-    html
-}
-
-/// The matched points of every few rows, dark far and yellow near.
-fn matches(run: &Run<'_>, side: Side) -> String {
-    let (left, pair) = (&run.record.eyes[0].parts, &run.record.pair);
-    if pair.rows.len() != left.contour.len() {
-        return String::new();
-    }
-    let offset = moved(run, side);
-    let matched = || left.contour.iter().zip(&pair.rows).filter(|(_, found)| found.weight > 0);
-    let disparities = || matched().map(|(_, found)| found.disparity);
-    let (low, high) = (disparities().min().unwrap_or(0), disparities().max().unwrap_or(0));
-    let step = left.bounds.map_or(1, |b| (i32::from(b.max.v - b.min.v) / ROWS).max(1));
-    let mut html = String::new();
-    for (point, found) in matched().filter(|(point, _)| (point.at.v >> 8) % step == 0) {
-        let share = f64::from(found.disparity - low) / f64::from((high - low).max(1));
-        let shift = if side == Side::Left { 0 } else { found.disparity };
-        let place = PixelPoint { u: point.at.u - shift, v: point.at.v + offset };
-        html += &circle(at(place), 1.4, "dot", shade(0.15 + 0.85 * share));
-    }
-    html
 }

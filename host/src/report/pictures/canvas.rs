@@ -2,6 +2,8 @@
 //!
 //! Coordinates are pixels of the picture, centres at integers. What lies outside is not drawn.
 
+use crate::report::layers::Place;
+use crate::report::layers::colour::Colour;
 use embedded_graphics::Pixel;
 use embedded_graphics::mono_font::ascii::{FONT_9X15_BOLD, FONT_10X20};
 use embedded_graphics::mono_font::{MonoFont, MonoTextStyle};
@@ -9,13 +11,7 @@ use embedded_graphics::pixelcolor::{Rgb888, RgbColor};
 use embedded_graphics::prelude::{DrawTarget, Drawable, OriginDimensions, Point, Size};
 use embedded_graphics::text::{Alignment, Baseline, Text, TextStyleBuilder};
 use image::{Rgb, RgbImage};
-use nalgebra::Vector2;
 use std::convert::Infallible;
-
-/// A point of the picture, px.
-pub(super) type Place = Vector2<f64>;
-/// Red, green, blue.
-pub(crate) type Colour = [u8; 3];
 
 /// Width of a line of large letters, px.
 pub(super) fn text_width(text: &str) -> u32 {

@@ -1,10 +1,11 @@
 //! Photographs and shaded meshes side by side, each over its name.
 
-use super::canvas::{Anchor, Canvas, Letters, Place};
-use super::colour::{FAINT, INK, PAPER};
+use super::canvas::{Anchor, Canvas, Letters};
 use super::model::{SIDE, shaded};
 use super::panel::{FOOT, GAP, HEAD};
 use crate::mesh::Mesh;
+use crate::report::layers::Place;
+use crate::report::layers::colour::{FAINT, INK, PAPER};
 use image::imageops::FilterType;
 use image::{DynamicImage, GrayImage, RgbImage};
 use nalgebra::{Matrix3, Rotation3, Vector3};

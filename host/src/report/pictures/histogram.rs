@@ -1,9 +1,10 @@
 //! How often each grey value comes, and where object and background were parted.
 
-use super::canvas::{Anchor, Canvas, Letters, Place};
-use super::colour::{ACCENT, FAINT, INK, PAPER};
-use super::eye::Seen;
+use super::canvas::{Anchor, Canvas, Letters};
 use super::panel::{FOOT, GAP, HEAD};
+use crate::report::layers::Place;
+use crate::report::layers::Seen;
+use crate::report::layers::colour::{ACCENT, FAINT, INK, PAPER};
 use image::RgbImage;
 
 /// Width of a grey value and height of the commonest, px.

@@ -2,23 +2,18 @@
 //! object and enlarged by a whole number, so that pixels stay to be seen.
 
 pub(crate) mod canvas;
-pub(crate) mod colour;
-pub(crate) mod eye;
 pub(crate) mod gallery;
 mod histogram;
+mod invariants;
 mod model;
-mod pair;
 mod panel;
 pub(crate) mod plot;
+pub(crate) mod sheet;
 
 use super::Run;
-use crate::reconstruct::Mode;
-use eye::Seen;
+use super::layers::pair::Pair;
 use image::RgbImage;
 use rayon::prelude::*;
-use shared::pipeline::Side;
-
-use super::words::view;
 
 /// File names of all pictures that a run may have, in the order of the stages.
 pub const NAMES: [&str; 10] = [
@@ -37,31 +32,23 @@ pub const NAMES: [&str; 10] = [
 /// The pictures of a run with their file names; none without rasters.
 #[must_use]
 pub fn draw(run: &Run<'_>) -> Vec<(&'static str, RgbImage)> {
-    let [left, right] = &run.record.eyes;
-    let (Some(left_rasters), Some(right_rasters)) = (&left.rasters, &right.rasters) else {
+    let eyes = &run.record.eyes;
+    if eyes.iter().any(|eye| eye.rasters.is_none()) {
         return Vec::new();
-    };
-    let views = [
-        Seen { name: view(&Side::Left), parts: &left.parts, rasters: left_rasters },
-        Seen { name: view(&Side::Right), parts: &right.parts, rasters: right_rasters },
-    ];
-    let pair = &run.record.pair;
-    let (offset, omega) = match run.options.mode {
-        Mode::Default => (run.reconstruction.outcome.vertical_offset, 0),
-        // The paper's stages take rows as they are.
-        Mode::Paper { omega } => (0, omega),
-    };
+    }
+    let pair = Pair::of(run.record, run.options.mode, run.reconstruction.outcome.vertical_offset);
+    let views = &pair.views;
     let painters: [&(dyn Fn() -> Option<RgbImage> + Sync); NAMES.len()] = [
-        &|| Some(histogram::histograms(&views)),
-        &|| eye::mask(&views),
-        &|| eye::contour(&views),
-        &|| eye::distance(&views),
-        &|| eye::skeleton(&views),
-        &|| pair::hulls(&views, pair, offset),
-        &|| pair::invariants(&views, pair, omega),
-        &|| pair::correspondence(&views, pair, offset),
-        &|| eye::curves(&views),
-        &|| model::model(left, &run.reconstruction.mesh, run.truth),
+        &|| Some(histogram::histograms(views)),
+        &|| sheet::mask(views),
+        &|| sheet::contour(views),
+        &|| sheet::distance(views),
+        &|| sheet::skeleton(views),
+        &|| sheet::hulls(&pair),
+        &|| pair.invariants().map(|found| invariants::chart(&found)),
+        &|| sheet::correspondence(&pair),
+        &|| sheet::curves(views),
+        &|| model::model(&eyes[0], &run.reconstruction.mesh, run.truth),
     ];
     let named = NAMES.into_par_iter().zip(painters);
     named.filter_map(|(name, paint)| Some((name, paint()?))).collect()
@@ -70,6 +57,7 @@ pub fn draw(run: &Run<'_>) -> Vec<(&'static str, RgbImage)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::reconstruct::Mode;
     use crate::report::fixture::Capsule;
     use crate::report::record::Record;
 

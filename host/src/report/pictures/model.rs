@@ -1,10 +1,11 @@
 //! The model from three sides beside the photograph, as in the paper's Figure 8.
 
-use super::canvas::{Anchor, Canvas, Letters, Place};
-use super::colour::{ACCENT, APART, FAINT, GROUND, INK, OBJECT, PAPER, RIM, WHITE, mix};
+use super::canvas::{Anchor, Canvas, Letters};
 use super::panel::{FOOT, GAP, HEAD};
 use crate::mesh::Mesh;
 use crate::render::render_with;
+use crate::report::layers::Place;
+use crate::report::layers::colour::{ACCENT, APART, FAINT, GROUND, INK, OBJECT, PAPER, RIM, WHITE, mix};
 use crate::report::record::{Eye, Parts, Rasters};
 use crate::stage::balls::px2;
 use crate::view::Pinhole;

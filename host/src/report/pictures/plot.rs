@@ -1,7 +1,8 @@
 //! A plot of one or more lines over whole numbers, its values counted from zero.
 
-use super::canvas::{Anchor, Canvas, Letters, Place};
-use super::colour::{APART, FAINT, INK, PAPER, mix};
+use super::canvas::{Anchor, Canvas, Letters};
+use crate::report::layers::Place;
+use crate::report::layers::colour::{APART, FAINT, INK, PAPER, mix};
 use image::RgbImage;
 
 /// Size of the picture, px.

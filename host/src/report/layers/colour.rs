@@ -1,25 +1,26 @@
 //! Colours that stay apart for every kind of colour vision.
 
-pub(crate) use super::canvas::Colour;
+/// Red, green, blue.
+pub(crate) type Colour = [u8; 3];
 
 /// Behind everything.
-pub(super) const PAPER: Colour = [250, 250, 248];
+pub(crate) const PAPER: Colour = [250, 250, 248];
 /// Text and lines on paper.
-pub(super) const INK: Colour = [40, 40, 44];
+pub(crate) const INK: Colour = [40, 40, 44];
 /// Text of less weight, and axes.
-pub(super) const FAINT: Colour = [140, 140, 146];
+pub(crate) const FAINT: Colour = [140, 140, 146];
 /// Around dots and letters on a dark picture.
-pub(super) const RIM: Colour = [20, 20, 24];
+pub(crate) const RIM: Colour = [20, 20, 24];
 /// On a dark picture.
-pub(super) const WHITE: Colour = [255, 255, 255];
+pub(crate) const WHITE: Colour = [255, 255, 255];
 /// What is to be seen first.
-pub(super) const ACCENT: Colour = [255, 159, 28];
+pub(crate) const ACCENT: Colour = [255, 159, 28];
 /// What was taken away.
-pub(super) const REMOVED: Colour = [196, 72, 72];
+pub(crate) const REMOVED: Colour = [196, 72, 72];
 /// Object and background of a drawn mask.
-pub(super) const OBJECT: Colour = [74, 78, 88];
+pub(crate) const OBJECT: Colour = [74, 78, 88];
 /// The background of a drawn mask.
-pub(super) const GROUND: Colour = [24, 25, 30];
+pub(crate) const GROUND: Colour = [24, 25, 30];
 
 /// The palette of Okabe and Ito (2008) without black, for things side by side.
 pub(crate) const APART: [Colour; 7] = [
@@ -53,7 +54,7 @@ pub(crate) fn shade(value: f64) -> Colour {
 }
 
 /// The colour a part (0 to 1) of the way from one to another.
-pub(super) fn mix(from: Colour, to: Colour, part: f64) -> Colour {
+pub(crate) fn mix(from: Colour, to: Colour, part: f64) -> Colour {
     std::array::from_fn(|k| {
         (f64::from(from[k]) + (f64::from(to[k]) - f64::from(from[k])) * part).round() as u8
     })
