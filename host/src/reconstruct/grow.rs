@@ -11,6 +11,7 @@ use crate::stage::balls::{self, Ball, Edge, Rays, distance_to_points, px2};
 use crate::stage::curve::curve_balls;
 use crate::stage::rectify::RectifiedCamera;
 use crate::stage::refine::refine;
+use crate::stage::simplify::simplify;
 use crate::stage::smooth::Smoother;
 use crate::stage::solid::{Chain, Outermost, SolidBall, solid, spheres};
 use crate::stage::surface::RoundCone;
@@ -21,6 +22,10 @@ use shared::stage::contour::ContourLoop;
 use shared::stage::depth::BallDepth;
 use shared::stage::medial::MedialBall;
 use shared::wire::Shape;
+
+/// So far the solid may move when its round cones become fewer, as a part of a pixel: what balls may stick out
+/// of others and be left out, and less than their noise.
+const TOLERANCE: f64 = 0.05;
 
 /// A shape and what follows from it.
 #[derive(Clone, Copy, Debug)]
@@ -97,6 +102,7 @@ impl Growth {
             Pieces::Cones => solid(&self.solid_balls, &self.chains, &mut self.cones),
             Pieces::Balls => spheres(&self.solid_balls, &mut self.cones),
         }
+        simplify(&mut self.cones, TOLERANCE * pixel);
     }
 
     /// The balls that the solid is made of, and their chains.

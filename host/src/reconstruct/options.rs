@@ -92,7 +92,7 @@ pub struct Options {
     pub threshold: binarise::Threshold,
     /// Whether the object is bright or dark.
     pub polarity: binarise::Polarity,
-    /// Grid spacing of the mesh, mm; by default that of a pixel at the object.
+    /// Grid spacing of the mesh, mm; by default two to three pixels at the object, by the thickness of its limbs.
     pub cell: Option<f64>,
     /// What was done to the images before they came here; told in the report.
     pub scene: Known,

@@ -19,6 +19,13 @@ use std::mem::take;
 
 /// Cells along the diagonal of a mesh at most, unless the user says otherwise.
 const MAX_CELLS: f64 = 300.0;
+/// The finest and the coarsest cell by default, px: a limb breaks where its radius is less than 0.84 cells, and the
+/// creases between limbs are rounded by up to a cell.
+const CELL_PX: [f64; 2] = [2.0, 3.0];
+/// What a contour point may be wrong by, px.
+const SAG: f64 = 0.03;
+/// Edges of faces, in cells.
+const EDGE_CELLS: f64 = 0.6;
 
 /// What a reconstruction needs in passing. It grows with the first pairs; the core's stages and the host's then
 /// allocate nothing for a pair as large as those, if what was made of the last one is given back ([`Self::recycle`]).
@@ -31,6 +38,8 @@ pub struct Workspace {
     mesher: Mesher,
     bodies: Bodies,
     mesh: Mesh,
+    /// Of the skeleton.
+    radii: Vec<f64>,
     clock: Clock,
 }
 
@@ -119,7 +128,8 @@ impl Workspace {
     fn finish(&mut self, solid: Solid, options: &Options) -> Result<Reconstruction, Refusal> {
         let Solid { outcome, camera, resampled } = solid;
         let cones = &self.growth.cones;
-        let cell = options.cell.unwrap_or_else(|| default_cell(&camera, cones));
+        self.radii.clone_from(&self.growth.skeleton.radii);
+        let cell = options.cell.unwrap_or_else(|| default_cell(&camera, cones, &mut self.radii));
         self.mesher.surface(cones, cell, &mut self.mesh)?;
         let dropped = self.bodies.keep_largest(&mut self.mesh);
         self.clock.lap("surface");
@@ -199,14 +209,45 @@ fn object_box(
     Ok(PixelBox { min: corner(found.min), max: corner(found.max) })
 }
 
-/// The mesh's grid spacing by default, mm: two pixels at the nearest ball, but no more than
-/// [`MAX_CELLS`] along the diagonal, which only a model that is wrong would have.
-fn default_cell(camera: &RectifiedCamera, cones: &[RoundCone]) -> f64 {
+/// The mesh's grid spacing by default, mm: [`cell_px`] at the nearest ball, but no more than [`MAX_CELLS`] along the
+/// diagonal, which only a model that is wrong would have.
+fn default_cell(camera: &RectifiedCamera, cones: &[RoundCone], radii: &mut [f64]) -> f64 {
     let balls = || cones.iter().flat_map(|c| c.centres.into_iter().zip(c.radii));
     let depth = balls().map(|(c, _)| c.z).fold(f64::INFINITY, f64::min);
     let low =
         balls().fold(Point3::from([f64::INFINITY; 3]), |low, (c, r)| low.inf(&(c - Vector3::repeat(r))));
     let high =
         balls().fold(Point3::from([-f64::INFINITY; 3]), |high, (c, r)| high.sup(&(c + Vector3::repeat(r))));
-    (2.0 * depth / camera.f).max((high - low).norm() / MAX_CELLS)
+    let pixel = depth / camera.f;
+    (cell_px(radii, pixel) * pixel).max((high - low).norm() / MAX_CELLS)
+}
+
+/// The grid spacing in pixels of `pixel` mm, for the radii of a skeleton, mm, which are put into another order.
+///
+/// The edges of faces are 0.6 cells long, and the middle of one stays behind a ball by its square over eight radii.
+/// That is what a contour may be wrong by, [`SAG`], at 0.82 times the root of the radius, all in pixels. The radius
+/// is that which nineteen of twenty points of the skeleton exceed, so that the thinner limbs decide.
+fn cell_px(radii: &mut [f64], pixel: f64) -> f64 {
+    let twentieth = radii.len() / 20;
+    if radii.is_empty() {
+        return CELL_PX[0];
+    }
+    let (_, &mut thin, _) = radii.select_nth_unstable_by(twentieth, f64::total_cmp);
+    ((8.0 * SAG * thin / pixel).sqrt() / EDGE_CELLS).clamp(CELL_PX[0], CELL_PX[1])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thick_limbs_have_wide_faces_and_thin_ones_keep_theirs() {
+        let pixel = 0.5;
+        // The tip of a limb is less than a twentieth of it.
+        let cell = |px: f64| cell_px(&mut [vec![1e-3; 4], vec![px * pixel; 96]].concat(), pixel);
+        assert_eq!([1.0, 5.0, 40.0].map(cell), [2.0, 2.0, 3.0]);
+        let between = cell(9.0);
+        assert!((0.6 * between).powi(2) / (8.0 * 9.0) < 0.03 + 1e-9 && between > 2.4, "{between}");
+        assert_eq!(cell_px(&mut [], pixel), 2.0);
+    }
 }

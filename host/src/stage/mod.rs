@@ -6,5 +6,6 @@ pub mod curve;
 pub mod refine;
 pub mod smooth;
 pub mod solid;
+pub mod simplify;
 pub mod triangulate;
 pub mod surface;

@@ -24,6 +24,7 @@ mod distance;
 mod lanes;
 mod lattice;
 mod mesher;
+mod near;
 mod patch;
 mod prune;
 mod region;

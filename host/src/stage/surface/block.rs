@@ -69,6 +69,8 @@ struct Leaf {
 pub(super) struct Grove {
     pub(super) blocks: Vec<Block>,
     moved: Vec<Point3<f64>>,
+    /// Where the moved points of the block that is added stand, by kind and cube.
+    shifted: Vec<[Point3<f64>; 64]>,
     cones: Vec<u32>,
     groups: Vec<Group>,
     /// Of the regions on the way down, by level.
@@ -96,11 +98,6 @@ const OFFSETS: [[[f32; LANES]; 3]; SITES / LANES] = {
 fn bit_of(leaf: usize, cube: usize) -> usize {
     let spread = |octant: usize| (octant >> 2) << 4 | (octant >> 1 & 1) << 2 | octant & 1;
     spread(leaf) << 1 | spread(cube)
-}
-
-/// The leaf of a cube of a block.
-pub(super) fn leaf_at(bit: usize) -> usize {
-    (bit >> 5) << 2 | (bit >> 3 & 1) << 1 | bit >> 1 & 1
 }
 
 impl Grove {
@@ -155,7 +152,7 @@ impl Grove {
             cones: [0; 128],
             others: [-1.0; 128],
         };
-        let mut moved = [[Point3::origin(); 64]; 2];
+        self.shifted.resize(2, [Point3::origin(); 64]);
         for (octant, Octant { region, around }) in Octant::all(region).enumerate() {
             let first_cone = self.cones.len();
             let middle = prune(bundle, around, 0.0, &mut self.answers, &mut self.cones);
@@ -202,11 +199,11 @@ impl Grove {
                 }
                 if site.position != unmoved {
                     block.moved[kind] |= 1 << bit;
-                    moved[kind][bit] = site.position;
+                    self.shifted[kind][bit] = site.position;
                 }
             }
         }
-        for (set, places) in block.moved.iter().zip(&moved) {
+        for (set, places) in block.moved.iter().zip(&self.shifted) {
             self.moved.extend(bits(*set).map(|bit| places[bit]));
         }
         self.blocks.push(block);
@@ -245,24 +242,23 @@ impl Grove {
 }
 
 impl Block {
-    /// The cone that decides the distance of a point.
-    pub(super) fn cone(&self, kind: usize, bit: usize) -> u32 {
-        self.cones[64 * kind + bit]
+    /// The cones that decide the distances of the points of a kind, and how far all others of their leaves are at
+    /// least, cubes; less than nothing where that is not known.
+    pub(super) fn nearest(&self, kind: usize) -> (&[u32], &[f32]) {
+        let points = 64 * kind..64 * kind + 64;
+        (&self.cones[points.clone()], &self.others[points])
     }
 
-    /// Whether `cone` decides the distance of a point, and no other cone of its leaf contains any place whose
-    /// distance from the point has this square, in cubes.
-    pub(super) fn alone(&self, cone: u32, kind: usize, bit: usize, square: f64) -> bool {
-        let others = f64::from(self.others[64 * kind + bit]);
-        self.cones[64 * kind + bit] == cone && others > 0.0 && square < others * others
+    /// The points of a kind that have been moved.
+    pub(super) fn moved(&self, kind: usize) -> u64 {
+        self.moved[kind]
     }
 
-    /// The block ahead, as in [`super::lattice::seen_ahead`], and the leaf of it in which `p` is.
-    pub(super) fn leaf_of(&self, lattice: &Lattice, p: &Point3<f64>) -> (usize, usize) {
+    /// The leaf in which `p` is, of this block or of one ahead, as in [`leaf_at`](super::near::leaf_at).
+    pub(super) fn leaf_of(&self, lattice: &Lattice, p: &Point3<f64>) -> usize {
         let from_corner = (p - lattice.position(self.corner)) * (1.0 / lattice.cube);
         let leaf = |axis: usize| ((from_corner[axis] + LOWERED).max(0.0) / f64::from(LEAF)) as usize;
-        let [x, y, z] = [leaf(0), leaf(1), leaf(2)];
-        ((x >> 1) << 2 | (y >> 1) << 1 | z >> 1, (x & 1) << 2 | (y & 1) << 1 | z & 1)
+        leaf(0).min(2) * 9 + leaf(1).min(2) * 3 + leaf(2).min(2)
     }
 }
 
@@ -325,6 +321,11 @@ pub(super) mod tests {
         (0..30).map(cone).collect()
     }
 
+    /// The leaf of a cube of a block.
+    fn leaf_at(bit: usize) -> usize {
+        (bit >> 5) << 2 | (bit >> 3 & 1) << 1 | bit >> 1 & 1
+    }
+
     fn grown(cones: &[RoundCone], cube: f64, check: impl Fn(&Solid, &Grove)) {
         let distances: Vec<Distance> = cones.iter().map(Distance::to).collect();
         let lattice = Lattice::around(cones, cube);
@@ -368,13 +369,13 @@ pub(super) mod tests {
                     let far = |cone: &Distance| cone.at(&p);
                     let least = solid.distances.iter().map(far).fold(f64::INFINITY, f64::min);
                     assert_eq!(block.inside[kind] >> bit & 1 == 1, least < 0.0, "{p}");
-                    let own = far(&solid.distances[block.cone(kind, bit) as usize]);
+                    let own = far(&solid.distances[block.nearest(kind).0[bit] as usize]);
                     assert!(least > 0.0 || own < 0.0, "{p} {own} {least}");
                     let leaf = &block.leaves[leaf_at(bit)];
                     for &cone in &grove.cones[leaf.first_cone as usize..][..leaf.cones as usize] {
                         let other = far(&solid.distances[cone as usize]) / solid.lattice.cube;
                         let known = f64::from(block.others[64 * kind + bit]);
-                        assert!(cone == block.cone(kind, bit) || known <= other, "{p} {known} {other}");
+                        assert!(cone == block.nearest(kind).0[bit] || known <= other, "{p} {known} {other}");
                     }
                     let way = (p - solid.lattice.position(point_of(block.corner, bit, kind))).norm();
                     assert!(way <= MAX_SHIFT * solid.lattice.cube * (1.0 + 1e-9), "{way}");

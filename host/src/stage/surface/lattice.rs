@@ -183,16 +183,6 @@ pub(super) fn seen_ahead(blocks: [u64; 8]) -> [u64; 8] {
     std::array::from_fn(|i| if i < 4 { here[i] } else { on_x(here[i - 4], next[i - 4]) })
 }
 
-/// The block ahead, as in [`seen_ahead`], and the bit in it, of the cube that is `ahead` of the cube at `bit`.
-#[inline]
-pub(super) fn cube_ahead(bit: usize, ahead: usize) -> (usize, usize) {
-    // The axes two bits apart of three: adding carries into the block's bit of its axis.
-    let spread = (bit & 0x30) << 2 | (bit & 0xc) << 1 | bit & 3;
-    let moved = spread + ((ahead & 4) << 4 | (ahead & 2) << 2 | ahead & 1);
-    let block = moved >> 6 & 4 | moved >> 4 & 2 | moved >> 2 & 1;
-    (block, moved >> 2 & 0x30 | moved >> 1 & 0xc | moved & 3)
-}
-
 /// The lattice point of a cube, in half cubes.
 pub(super) fn point_of(block_corner: [i32; 3], bit: usize, kind: usize) -> [i32; 3] {
     let cube = [bit >> 4, bit >> 2 & 3, bit & 3];
@@ -200,8 +190,17 @@ pub(super) fn point_of(block_corner: [i32; 3], bit: usize, kind: usize) -> [i32;
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
+
+    /// The block ahead, as in [`seen_ahead`], and the bit in it, of the cube that is `ahead` of the cube at `bit`.
+    pub(in crate::stage::surface) fn cube_ahead(bit: usize, ahead: usize) -> (usize, usize) {
+        // The axes two bits apart of three: adding carries into the block's bit of its axis.
+        let spread = (bit & 0x30) << 2 | (bit & 0xc) << 1 | bit & 3;
+        let moved = spread + ((ahead & 4) << 4 | (ahead & 2) << 2 | ahead & 1);
+        let block = moved >> 6 & 4 | moved >> 4 & 2 | moved >> 2 & 1;
+        (block, moved >> 2 & 0x30 | moved >> 1 & 0xc | moved & 3)
+    }
 
     /// A corner's place in half cubes, of the cube at the origin.
     fn place(corner: Corner) -> Point3<f64> {

@@ -15,6 +15,7 @@ use super::{
     block::{EDGE, Grove, MAX_BLOCKS},
     distance::Distance,
     lattice::{Lattice, SIDE},
+    near::{Numbers, Points},
     patch::{Blocks, Cut, Place},
     prune::{Answer, prune},
     region::{Level, Octant, Region, Solid},
@@ -47,14 +48,22 @@ struct Seeds {
 }
 
 impl Mesher {
-    /// As [`surface`](super::surface), into `mesh`, which is emptied first.
+    /// As [`surface`](super::surface), into `mesh`, which is left empty where there is none.
     ///
     /// # Errors
     ///
     /// See [`SurfaceError`].
     pub fn surface(&mut self, cones: &[RoundCone], cell: f64, mesh: &mut Mesh) -> Result<(), SurfaceError> {
-        mesh.vertices.clear();
-        mesh.faces.clear();
+        let made = self.fill(cones, cell, mesh);
+        if made.is_err() {
+            mesh.vertices.clear();
+            mesh.faces.clear();
+        }
+        made
+    }
+
+    /// Makes the surface; what `mesh` has held is overwritten.
+    fn fill(&mut self, cones: &[RoundCone], cell: f64, mesh: &mut Mesh) -> Result<(), SurfaceError> {
         super::check(cones, cell)?;
         let lattice = Lattice::around(cones, cell * CUBE);
         let too_fine = SurfaceError::TooFine { cell, size: lattice.size };
@@ -174,19 +183,23 @@ impl<'a> Wood<'a> {
         let count = |of: fn(&Cut) -> u32| cuts.iter().flatten().map(|cut| of(cut) as usize).sum();
         mesh.vertices.resize(count(|cut| cut.vertices), Point3::origin());
         spread(0, cuts, &mut mesh.vertices, |cut| cut.vertices, &|grove, mut vertices| {
-            for cut in &cuts[grove] {
+            let mut points = Points::default();
+            for cut in cuts[grove].iter().filter(|cut| cut.vertices > 0) {
                 let (own, others) = vertices.split_at_mut(cut.vertices as usize);
-                cut.put_vertices(solid, &self.blocks(&cut.ahead), own);
+                let blocks = self.blocks(&cut.ahead);
+                points.fill(solid, &blocks);
+                cut.put_vertices(solid, &blocks, &points, own);
                 vertices = others;
             }
         });
         mesh.faces.resize(count(|cut| cut.faces), [0; 3]);
         let vertices = &mesh.vertices;
         spread(0, cuts, &mut mesh.faces, |cut| cut.faces, &|grove, mut faces| {
-            for cut in &cuts[grove] {
+            let mut numbers = Numbers::default();
+            for cut in cuts[grove].iter().filter(|cut| cut.faces > 0) {
                 let (own, others) = faces.split_at_mut(cut.faces as usize);
-                let cuts = cut.ahead.map(|place| Some(&cuts[place?.0 as usize][place?.1 as usize]));
-                Cut::put_faces(&self.blocks(&cut.ahead), &cuts, vertices, own);
+                numbers.fill(&cut.ahead.map(|place| Some(&cuts[place?.0 as usize][place?.1 as usize])));
+                Cut::put_faces(&self.blocks(&cut.ahead), &numbers, vertices, own);
                 faces = others;
             }
         });

@@ -8,8 +8,9 @@
 use nalgebra::Point3;
 
 use super::{
-    block::{Block, Grove, bits, leaf_at},
-    lattice::{Corner, EDGES, ENDS, Edge, TETRAHEDRA, cube_ahead, seen_ahead},
+    block::{Block, Grove, bits},
+    lattice::{Corner, EDGES, ENDS, Edge, TETRAHEDRA, seen_ahead},
+    near::{AHEAD, Numbers, PLACES, Points, Seen, block_of},
     region::Solid,
 };
 
@@ -93,57 +94,49 @@ impl Cut {
         Self { edges, first, first_vertex: 0, vertices, faces: faces.sum(), ahead }
     }
 
-    /// The number of the vertex on an edge that is cut.
-    fn vertex(&self, direction: usize, bit: usize) -> u32 {
-        let before = self.edges[direction] & ((1 << bit) - 1);
-        self.first_vertex + u32::from(self.first[direction]) + before.count_ones()
+    /// The edges in a direction that are cut, and the number of the first one's vertex.
+    pub(super) fn numbered(&self, direction: usize) -> (u64, u32) {
+        (self.edges[direction], self.first_vertex + u32::from(self.first[direction]))
     }
 
-    /// Puts the block's vertices into `vertices`, mm.
-    pub(super) fn put_vertices(&self, solid: &Solid, blocks: &Blocks, vertices: &mut [Point3<f64>]) {
+    /// Puts the block's vertices into `vertices`, mm; `points` are those that it sees.
+    pub(super) fn put_vertices(
+        &self,
+        solid: &Solid,
+        blocks: &Blocks,
+        points: &Points,
+        vertices: &mut [Point3<f64>],
+    ) {
+        let inside = inside(blocks);
         let mut vertices = vertices.iter_mut();
-        for (direction, &edges) in self.edges.iter().enumerate() {
+        for (ends, &edges) in ENDS.iter().zip(&self.edges) {
+            let first_inside = inside[ends[0].kind][ends[0].ahead];
             for bit in bits(edges) {
-                let ends = ENDS[direction].map(|corner| End::of(blocks, corner, bit));
-                let [from, to] = if ends[0].inside { ends } else { [ends[1], ends[0]] };
+                let [first, second] =
+                    ends.map(|Corner { kind, ahead }| points.at(kind, PLACES[bit] + AHEAD[ahead]));
+                let [from, to] =
+                    if first_inside >> bit & 1 == 1 { [&first, &second] } else { [&second, &first] };
                 *vertices.next().expect("a place for each vertex") = crossing(solid, blocks, from, to);
             }
         }
     }
 
-    /// Puts the block's faces into `faces`; `cuts` are those of `blocks`.
+    /// Puts the block's faces into `faces`; `numbers` are those of the vertices that it sees.
     pub(super) fn put_faces(
         blocks: &Blocks,
-        cuts: &[Option<&Cut>; 8],
+        numbers: &Numbers,
         vertices: &[Point3<f64>],
         faces: &mut [[u32; 3]],
     ) {
         let inside = inside(blocks);
         let mut faces = faces.iter_mut();
         let mut put = |face| *faces.next().expect("a place for each face") = face;
-        let own = cuts[0].expect("a block");
-        let mut numbers = [[0; 64]; EDGES];
-        let mut next = own.first_vertex;
-        for (numbers, &edges) in numbers.iter_mut().zip(&own.edges) {
-            for bit in bits(edges) {
-                numbers[bit] = next;
-                next += 1;
-            }
-        }
         for (tetrahedron, rings) in TETRAHEDRA.iter().zip(&RINGS) {
             let [a, b, c, d] = tetrahedron.corners.map(|corner| inside[corner.kind][corner.ahead]);
             for bit in bits((a | b | c | d) & !(a & b & c & d)) {
                 let set = (a >> bit & 1) | (b >> bit & 1) << 1 | (c >> bit & 1) << 2 | (d >> bit & 1) << 3;
                 let ring = &rings[set as usize];
-                let vertex = |i: usize| {
-                    let (direction, ahead) = (usize::from(ring.edges[i][0]), usize::from(ring.edges[i][1]));
-                    match cube_ahead(bit, ahead) {
-                        (0, bit) => numbers[direction][bit],
-                        (ahead, bit) => cuts[ahead]
-                            .expect("no edge is cut of where there is no block")
-                            .vertex(direction, bit),
-                    }
-                };
+                let vertex = |i: usize| numbers.at(PLACES[bit] + usize::from(ring.edges[i]));
                 let [p, q, r] = [vertex(0), vertex(1), vertex(2)];
                 if ring.four {
                     split([p, q, r, vertex(3)], vertices).into_iter().for_each(&mut put);
@@ -158,15 +151,15 @@ impl Cut {
 /// The edges of a tetrahedron that the surface cuts, in the order of the face's corners.
 #[derive(Clone, Copy)]
 struct Ring {
-    /// Direction, and cube ahead.
-    edges: [[u8; 2]; 4],
+    /// See [`Numbers::offset`].
+    edges: [u16; 4],
     /// Whether they are four, or three.
     four: bool,
 }
 
 /// For each tetrahedron and each set of its corners inside.
 const RINGS: [[Ring; 16]; TETRAHEDRA.len()] = {
-    let mut rings = [[Ring { edges: [[0; 2]; 4], four: false }; 16]; TETRAHEDRA.len()];
+    let mut rings = [[Ring { edges: [0; 4], four: false }; 16]; TETRAHEDRA.len()];
     let mut i = 0;
     while i < TETRAHEDRA.len() * 16 {
         let (tetrahedron, set) = (&TETRAHEDRA[i / 16], i % 16);
@@ -181,7 +174,7 @@ const RINGS: [[Ring; 16]; TETRAHEDRA.len()] = {
         while corner < 4 {
             let [from, to] = pairs[corner];
             let Edge { direction, ahead } = tetrahedron.edges[FEWER_FIRST[set][from]][FEWER_FIRST[set][to]];
-            ring.edges[corner] = [direction as u8, ahead as u8];
+            ring.edges[corner] = Numbers::offset(direction, ahead) as u16;
             corner += 1;
         }
         i += 1;
@@ -195,29 +188,12 @@ fn split([p, q, r, s]: [u32; 4], vertices: &[Point3<f64>]) -> [[u32; 3]; 2] {
     if apart(p, r) <= apart(q, s) { [[p, q, r], [p, r, s]] } else { [[p, q, s], [q, r, s]] }
 }
 
-/// An end of an edge.
-#[derive(Clone, Copy)]
-struct End<'a> {
-    grove: &'a Grove,
-    block: &'a Block,
-    kind: usize,
-    bit: usize,
-    inside: bool,
-    /// The block ahead, and the leaf of it.
-    leaf: (usize, usize),
-}
-
-impl<'a> End<'a> {
-    /// The corner of the cube at `bit` of the first of the blocks.
-    fn of(blocks: &Blocks<'a>, Corner { kind, ahead }: Corner, bit: usize) -> Self {
-        let (ahead, bit) = cube_ahead(bit, ahead);
-        let (grove, block) = blocks[ahead].expect("no edge is cut to where there is no block");
-        let inside = block.inside[kind] >> bit & 1 == 1;
-        Self { grove, block, kind, bit, inside, leaf: (ahead, leaf_at(bit)) }
-    }
-
-    fn position(&self, solid: &Solid) -> Point3<f64> {
-        self.grove.position(solid, self.block, self.kind, self.bit)
+impl Seen {
+    /// Whether `cone` decides the distance of this point, and no other cone of its leaf contains any place whose
+    /// distance from the point has this square, in cubes.
+    fn is_alone(&self, cone: u32, square: f64) -> bool {
+        let others = f64::from(self.others);
+        self.cone == cone && others > 0.0 && square < others * others
     }
 }
 
@@ -225,9 +201,9 @@ impl<'a> End<'a> {
 ///
 /// It leaves the cone that decides at its start; where it does, another may contain it, of which it is
 /// followed to its end, until none does. None can where an end of the edge knows that all others are further.
-fn crossing(solid: &Solid, blocks: &Blocks, start: End, end: End) -> Point3<f64> {
-    let [from, to] = [start, end].map(|end| end.position(solid));
-    let mut cone = start.block.cone(start.kind, start.bit);
+fn crossing(solid: &Solid, blocks: &Blocks, start: &Seen, end: &Seen) -> Point3<f64> {
+    let [from, to] = [start.position, end.position];
+    let mut cone = start.cone;
     let step = to - from;
     let square = step.norm_squared() / (solid.lattice.cube * solid.lattice.cube);
     let mut share = 0.0;
@@ -236,15 +212,15 @@ fn crossing(solid: &Solid, blocks: &Blocks, start: End, end: End) -> Point3<f64>
         share = exit;
         let p = from + step * share;
         let leaf = blocks[0].expect("a block").1.leaf_of(solid.lattice, &p);
-        let alone = |end: End, share: f64| {
-            end.leaf == leaf && end.block.alone(cone, end.kind, end.bit, share * share * square)
-        };
-        if alone(start, share) || alone(end, 1.0 - share) {
+        let is_alone =
+            |end: &Seen, share: f64| end.leaf == leaf && end.is_alone(cone, share * share * square);
+        if is_alone(start, share) || is_alone(end, 1.0 - share) {
             break;
         }
-        let Some((grove, block)) = blocks.get(leaf.0).copied().flatten() else { break };
+        let (ahead, octant) = block_of(leaf);
+        let Some((grove, block)) = blocks[ahead] else { break };
         let exact = EXACT * solid.lattice.cube;
-        let Some(deeper) = grove.deepest_but(cone, solid, (block, leaf.1), (&p, exact)) else { break };
+        let Some(deeper) = grove.deepest_but(cone, solid, (block, octant), (&p, exact)) else { break };
         cone = deeper;
     }
     from + step * share.clamp(END, 1.0 - END)

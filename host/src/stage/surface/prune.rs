@@ -198,8 +198,11 @@ fn end_by_ball(group: &Group, end: Lanes, rival: Rival, offset: Vectors, reach: 
 #[inline(always)]
 fn by_ball(group: &Group, rival: Rival, offset: Vectors, reach: f32) -> Lanes {
     let low = end_by_ball(group, group.low, rival, offset, reach);
-    let high = end_by_ball(group, group.high, rival, offset, reach);
     let length = group.high - group.low;
+    if !Lanes::ZERO.simd_lt(length).any() {
+        return low;
+    }
+    let high = end_by_ball(group, group.high, rival, offset, reach);
     let ends = low.fast_min(high) - length * length * Lanes::splat(0.25);
     // A long cone is not its ends.
     length.simd_lt(Lanes::splat(SHORT)).bitselect(ends, Lanes::splat(-1.0))
