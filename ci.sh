@@ -2,7 +2,8 @@
 # The one list of checks.
 #
 #   ./ci.sh            everything
-#   ./ci.sh NAME...    single parts: fmt lint test bench doc firmware v4l2, and qemu, which test contains
+#   ./ci.sh NAME...    single parts: fmt lint test bench doc firmware v4l2 fuzz; qemu, which test contains; and
+#                      supply, which installs tools for minutes and is run where changes are merged
 #
 # Installs what a fresh Debian machine with rustup lacks. The last line is "N passed, N failed", counting
 # tests, and one for each check that is not made of tests. A part that ran no test fails. Exit codes: 0 all
@@ -10,7 +11,7 @@
 set -uo pipefail
 cd "$(dirname "$0")" || exit 1
 
-PARTS=(fmt lint test bench doc firmware v4l2)
+PARTS=(fmt lint test bench doc firmware v4l2 fuzz)
 TARGET=thumbv7em-none-eabihf
 CASES=../shared/eval
 
@@ -105,6 +106,7 @@ emulator() {
 part_fmt() {
     toolchain "cargo fmt --version" "install rustfmt (Debian: apt-get install rustfmt)" component add rustfmt
     check cargo fmt --all --check
+    check cargo fmt --manifest-path fuzz/Cargo.toml --check
 }
 
 part_lint() {
@@ -128,6 +130,24 @@ part_bench() { check cargo bench -q --locked -p system-tests -- --test 640x480; 
 
 part_doc() { RUSTDOCFLAGS="-D warnings" check cargo doc -q --workspace --no-deps --locked; }
 
+# What of an image goes to a board's flash. Names of symbols beside it are made of what is called where.
+flashed() {
+    readelf -x .vector_table -x .text -x .rodata -x .data "$1"
+}
+
+# The camera's image from another folder, which must be the same to the byte.
+same_elsewhere() {
+    local folder image=$TARGET/release/camera status
+    folder=$(mktemp -d "${TMPDIR:-/tmp}/a folder elsewhere.XXXXXX") || return 1
+    tar -cf - .cargo Cargo.lock Cargo.toml firmware host memory.x shared tests | tar -xf - -C "$folder"
+    (cd "$folder" && CARGO_TARGET_DIR=built cargo build -q -p firmware --target "$TARGET" --release --locked) &&
+        flashed "target/$image" >"$folder/here" && flashed "$folder/built/$image" >"$folder/there" &&
+        [ -s "$folder/here" ] && cmp "$folder/here" "$folder/there"
+    status=$?
+    rm -rf "$folder"
+    return "$status"
+}
+
 part_firmware() {
     board_target
     # Boards exclude each other: one at a time, and each is looked at as closely as the rest.
@@ -140,6 +160,7 @@ part_firmware() {
     check cargo clippy -q -p shared --example sketch --target "$TARGET" --release --locked -- -D warnings
     # As the user builds it, and what it takes.
     check cargo build -q -p firmware --target "$TARGET" --release --locked
+    check same_elsewhere
     tests cargo test -q --locked -p system-tests --test footprint -- --nocapture
 }
 
@@ -160,6 +181,24 @@ part_v4l2() {
     need v4l2-ctl v4l-utils
     check cargo build -q --release --locked -p host
     tests cargo test --release --locked -p system-tests --test v4l2 -- --ignored --nocapture
+}
+
+# Inputs for two minutes, on whatever reads some (fuzz/run).
+part_fuzz() {
+    need c++ g++
+    check fuzz/run 20
+}
+
+# Third-party code: licences, duplicates and sources (deny.toml), and what each package is made of, as
+# PACKAGE/PACKAGE.cdx.json. Known vulnerabilities need the network: the hosted workflow asks for them.
+part_supply() {
+    local tool
+    for tool in cargo-deny cargo-cyclonedx; do
+        command -v "$tool" >/dev/null || cargo install -q --locked "$tool"
+    done
+    cargo fetch -q --locked
+    check cargo deny --offline --locked check licenses bans sources
+    check cargo cyclonedx -q --format json --spec-version 1.5 --target all
 }
 
 parts=("$@")

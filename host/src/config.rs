@@ -124,7 +124,12 @@ impl Config {
         Self::parse(path, &std::fs::read_to_string(path).map_err(unreadable)?)
     }
 
-    fn parse(path: &Path, text: &str) -> Result<Self, ConfigError> {
+    /// Reads the text of a file, which errors call `path`.
+    ///
+    /// # Errors
+    ///
+    /// If it is not TOML, or holds what is no value of an option.
+    pub fn parse(path: &Path, text: &str) -> Result<Self, ConfigError> {
         let reader = Reader { path, text };
         let root = DeTable::parse(text).map_err(|error| {
             let words = error.message().lines().collect::<Vec<_>>().join(", ");

@@ -19,12 +19,12 @@
 use crate::export::ExportError;
 use crate::export::ply;
 use crate::reconstruct::Reconstruction;
-use crate::report::page::Content;
+use crate::report::page::{self, Content};
 use crate::report::{Refused, Run, numbers, pictures};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{GrayImage, RgbImage};
 use rayon::prelude::*;
-use std::io::{self, Write};
+use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
@@ -32,6 +32,8 @@ use tempfile::NamedTempFile;
 pub(crate) const PICTURES: &str = "pictures";
 /// The page.
 const PAGE: &str = "report.html";
+/// Bytes of a page among which its mark is.
+const HEAD: u64 = 1024;
 
 /// Write all files of a run into `folder`, which is created if it is missing, and a page if that is wanted;
 /// returns the report's text.
@@ -137,7 +139,7 @@ fn write_into(folder: &Path, run: &Run<'_>, page: bool) -> Result<Vec<u8>, Expor
         .prefix(".unfinished-")
         .tempdir_in(folder)
         .map_err(|source| failed(folder, source))?;
-    let stage = Stage { folder, staged: staged.path(), was_result: is_result(folder) };
+    let stage = Stage { folder, staged: staged.path() };
     let mut names = stage.models(run.reconstruction)?;
     // Only a mesh that could be written is sound enough to be measured.
     let report = numbers::json(run);
@@ -162,8 +164,6 @@ fn write_into(folder: &Path, run: &Run<'_>, page: bool) -> Result<Vec<u8>, Expor
 struct Stage<'a> {
     folder: &'a Path,
     staged: &'a Path,
-    /// Whether the folder held the results of an earlier run: only then is a page in it one of ours.
-    was_result: bool,
 }
 
 impl Stage<'_> {
@@ -218,7 +218,8 @@ impl Stage<'_> {
             std::fs::rename(self.staged.join(name), &path).map_err(|source| failed(&path, source))?;
         }
         let drawn = pictures::NAMES.iter().map(|name| format!("{PICTURES}/{name}"));
-        for name in drawn.chain(self.was_result.then(|| PAGE.to_owned())) {
+        let page = is_ours(&self.folder.join(PAGE)).then(|| PAGE.to_owned());
+        for name in drawn.chain(page) {
             let path = self.folder.join(&name);
             if !names.contains(&name) && path.is_file() {
                 std::fs::remove_file(&path).map_err(|source| failed(&path, source))?;
@@ -226,6 +227,13 @@ impl Stage<'_> {
         }
         Ok(())
     }
+}
+
+/// Whether a page says at its head that this program made it.
+fn is_ours(page: &Path) -> bool {
+    let mut head = Vec::new();
+    let read = std::fs::File::open(page).and_then(|file| file.take(HEAD).read_to_end(&mut head));
+    read.is_ok() && String::from_utf8_lossy(&head).contains(page::MARK)
 }
 
 /// A drawn picture as a file. Flat colours compress well enough at the least effort, which is several
@@ -271,6 +279,11 @@ mod tests {
         let foreign = parent.path().join("foreign");
         fs::create_dir(&foreign).unwrap();
         fs::write(foreign.join(PAGE), "kept").unwrap();
+        let stale = parent.path().join("stale");
+        fs::create_dir(&stale).unwrap();
+        fs::copy(folder.join(PAGE), stale.join(PAGE)).unwrap();
+        write(&stale, &Capsule::new(Mode::Default, Record::figures_only()).run(), false).unwrap();
+        assert!(!stale.join(PAGE).exists(), "a page of ours, such as a refused pair's, goes");
         write(&foreign, &Capsule::new(Mode::Default, Record::figures_only()).run(), false).unwrap();
         assert_eq!(fs::read(foreign.join(PAGE)).unwrap(), b"kept");
         write(&folder, &Capsule::new(Mode::Default, Record::figures_only()).run(), false).unwrap();

@@ -508,6 +508,39 @@ fn nobody_listening_is_no_failure() {
     }
 }
 
+/// A limit on the length of files stands for a full disk: writing fails in the middle.
+#[test]
+#[cfg(unix)]
+fn a_full_disk_is_a_failure_that_leaves_what_was_there() {
+    let folder = TempDir::new().unwrap();
+    let args = ["replay", &torus("left.png"), &torus("right.png"), "--no-pictures", "--out", "model"];
+    let program = Command::cargo_bin("host").unwrap().get_program().to_owned();
+    // Blocks of 512 bytes; without the signal, writing beyond them is an error like any other.
+    let limited = |blocks: &str| {
+        let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" \"$@\"");
+        let output = std::process::Command::new("sh")
+            .current_dir(folder.path())
+            .args(["-c", &script])
+            .arg(&program)
+            .args(args)
+            .output()
+            .unwrap();
+        (output.status.code(), String::from_utf8(output.stderr).unwrap())
+    };
+    for blocks in ["0", "1", "64"] {
+        let (code, told) = limited(blocks);
+        assert_eq!(code, Some(1), "{blocks}: {told}");
+        assert!(told.starts_with("error: cannot write model"), "{told}");
+        let left = fs::read_dir(folder.path().join("model")).map_or(0, |files| files.count());
+        assert_eq!(left, 0, "{blocks}: something is left");
+    }
+    good(folder.path(), &args);
+    let whole = results(&folder.path().join("model"));
+    assert_eq!(limited("64").0, Some(1));
+    assert_eq!(results(&folder.path().join("model")), whole, "the results before are untouched");
+    assert_eq!(limited("unlimited").0, Some(0));
+}
+
 #[test]
 fn help_shows_how() {
     for args in [

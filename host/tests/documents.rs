@@ -110,14 +110,16 @@ fn the_tutorial_of_the_board_is_true() {
     follow("docs/tutorials/board.md");
 }
 
-/// Every Markdown file of the project, but for what builds leave.
+/// Every Markdown file of the project, but for what builds leave, and for transcripts, which are of wrong usage too and
+/// have a test of their own.
 fn documents(folder: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         let hidden = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
-        if path.is_dir() && !path.ends_with("target") && !hidden {
-            found.extend(documents(&path));
+        if path.is_dir() {
+            let of_others = hidden || ["target", "transcripts"].iter().any(|name| path.ends_with(name));
+            found.extend(if of_others { Vec::new() } else { documents(&path) });
         } else if path.extension().is_some_and(|extension| extension == "md") {
             found.push(path);
         }
@@ -125,9 +127,9 @@ fn documents(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// The words of a line as a shell would pass them on: no comment, no quotes.
+/// The words of a line as a shell would pass them on: no comment, no pipe, no quotes.
 fn words(line: &str) -> Vec<String> {
-    let line = line.split(" #").next().unwrap_or_default();
+    let line = [" #", " |", " 2>"].iter().fold(line, |line, end| line.split(end).next().unwrap_or_default());
     line.split_whitespace().map(|word| word.trim_matches(['\'', '"']).to_owned()).collect()
 }
 

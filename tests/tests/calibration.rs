@@ -117,7 +117,9 @@ fn ros(left: &str, right: &str) -> Result<StereoCamera, String> {
     for (name, text) in [("left.yaml", left), ("right.yaml", right)] {
         std::fs::write(folder.path().join(name), text).expect("write");
     }
-    StereoCamera::read(folder.path()).map_err(|error| error.to_string())
+    let read = StereoCamera::read(folder.path());
+    assert_eq!(StereoCamera::parse_two(left, right).ok(), read.as_ref().ok().copied());
+    read.map_err(|error| error.to_string())
 }
 
 #[test]

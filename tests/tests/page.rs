@@ -163,7 +163,7 @@ fn look(browser: &mut Browser, report: &Report) {
     }
     assert_eq!(browser.complaints(), Vec::<String>::new(), "{}", report.name);
     assert_eq!(browser.requests(), [address], "{}", report.name);
-    browser.close(page);
+    browser.close(&page);
 }
 
 #[test]

@@ -21,6 +21,7 @@ use std::os::unix::net::UnixListener;
 use std::path::Path;
 use std::rc::Rc;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
@@ -314,6 +315,25 @@ fn a_port_is_let_go_before_it_is_opened_again() {
     let again = session.resume(|| Instant::now() >= end, |_| told += 1).unwrap();
     assert_eq!(again.map(|hello| hello.board), Some(hello.board));
     assert_eq!((session.tally().reconnections, told), (1, 1));
+}
+
+/// Who waits does not look all the time, and says once what it waits for.
+#[test]
+fn a_device_that_is_gone_is_looked_for_twice_a_second() {
+    let (folder, pictures) = scene();
+    let address = Address::Socket(serve(folder.path(), &pictures, intact, usize::MAX));
+    let tries = Arc::new(AtomicU32::new(0));
+    let counted = tries.clone();
+    let opener = move || match counted.fetch_add(1, Ordering::Relaxed) {
+        0 => address.open(0),
+        _ => Err(PortError::None),
+    };
+    let (mut session, _) = Session::begin(Box::new(opener), None).unwrap();
+    let (end, mut told) = (Instant::now() + Duration::from_millis(2300), 0);
+    assert_eq!(session.resume(|| Instant::now() >= end, |_| told += 1).unwrap(), None);
+    // The first one was to begin with; a machine that is busy looks less often.
+    assert!((2..=6).contains(&tries.load(Ordering::Relaxed)), "{tries:?}");
+    assert_eq!(told, 1);
 }
 
 #[test]

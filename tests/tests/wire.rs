@@ -14,7 +14,7 @@ use shared::bitmap::{Bitmap, Size};
 use shared::limits::CapacityError;
 use shared::pipeline::Finding;
 use shared::wire::{
-    PairReport, PictureKind, ToDevice, ToHost, VERSION, WireError, calibration_crc, pack_mask,
+    Hello, PairReport, PictureKind, ToDevice, ToHost, VERSION, WireError, calibration_crc, pack_mask,
 };
 use std::path::Path;
 
@@ -100,6 +100,15 @@ fn another_version_is_named() {
         assert_eq!(read, Err(WireError::Unknown { what: "message type", code: 0x60 }));
     });
     assert_eq!(command(0x60, &[]), Err(WireError::Unknown { what: "command", code: 0x60 }));
+}
+
+/// A terminal would obey it.
+#[test]
+fn a_name_of_a_board_is_no_command_to_a_terminal() {
+    for board in ["\u{1b}]0;owned\u{7}", "mps2\n", "\u{9b}2J"] {
+        let sent = bytes(&ToHost::Hello(Hello { board, ..oracle::wire::hello() }));
+        read(&sent, |read| assert_eq!(read, Err(WireError::Invalid("name of a board")), "{board:?}"));
+    }
 }
 
 #[test]

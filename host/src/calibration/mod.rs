@@ -185,6 +185,16 @@ impl StereoCamera {
         Self::from_documents(&Document::parse("", text)?, None)
     }
 
+    /// Reads the texts of a pair of files, as [`Self::read`] does.
+    ///
+    /// # Errors
+    ///
+    /// Whatever [`CalibrationError`] lists, with the line where there is one.
+    pub fn parse_two(first: &str, second: &str) -> Result<Self, CalibrationError> {
+        let [first, second] = [Document::parse("", first)?, Document::parse("", second)?];
+        Self::from_documents(&first, Some(&second))
+    }
+
     /// Writes the pair as OpenCV's `M1 D1 M2 D2 R T`, under a temporary name first, so that the file
     /// is there whole or not at all. [`Self::read`] gives back the same bits.
     ///

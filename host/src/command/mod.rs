@@ -193,7 +193,7 @@ impl Cli {
     /// # Errors
     ///
     /// A [`clap::Error`] for wrong usage; otherwise a sentence for the user.
-    fn run(&self) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<(), Failure> {
         color::choose(self.everywhere.color);
         match &self.command {
             Command::Replay(args) => replay::run(args),

@@ -13,7 +13,8 @@
 //! Two files, or one, leave their results in --out; folders and patterns leave those of each pair in a
 //! folder of its own below. There: model.ply (closed, mm, axes of the left camera), skeleton.ply,
 //! boundary.ply, report.json and pictures of every stage. What does not give a trustworthy model is
-//! refused with the reason, and leaves no files, nor those of an earlier run; the other pairs go on.
+//! refused with the reason, and leaves no files, nor those of an earlier run, but with --report a page that shows
+//! why; the other pairs go on.
 //!
 //! Pairs are made side by side, one a core; --timings tells where their time goes. Undisturbed times are those of
 //! --jobs 1.

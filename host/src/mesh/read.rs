@@ -73,18 +73,36 @@ pub fn read(path: &Path) -> Result<Mesh, ReadError> {
 ///
 /// As [`read`].
 pub fn read_geometry(path: &Path) -> Result<Geometry, ReadError> {
-    let extension = path.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase);
-    let parse = match extension.as_deref() {
-        Some("ply") => ply::parse,
-        Some("obj") => |bytes: &[u8]| obj::parse(bytes).map(Geometry::Mesh),
-        Some("stl") => |bytes: &[u8]| stl::parse(bytes).map(Geometry::Mesh),
-        _ => return Err(ReadError::Extension { path: path.to_path_buf() }),
-    };
+    format(path)?;
     let bytes = bytes_of(path).map_err(|source| ReadError::Io { path: path.to_path_buf(), source })?;
     if bytes.len() as u64 > MAX_BYTES {
         return Err(ReadError::TooLarge { path: path.to_path_buf() });
     }
-    parse(&bytes).and_then(sound).map_err(|what| ReadError::Content { path: path.to_path_buf(), what })
+    parse(path, &bytes)
+}
+
+/// Reads the mesh in the bytes of a file of this name, or the curves of a PLY file without faces.
+///
+/// # Errors
+///
+/// As [`read`].
+pub fn parse(path: &Path, bytes: &[u8]) -> Result<Geometry, ReadError> {
+    let content = |what| ReadError::Content { path: path.to_path_buf(), what };
+    format(path)?(bytes).and_then(sound).map_err(content)
+}
+
+/// What makes a mesh or curves of bytes, or says what is wrong with them.
+type Parse = fn(&[u8]) -> Result<Geometry, String>;
+
+/// What reads bytes of the format that a name says.
+fn format(path: &Path) -> Result<Parse, ReadError> {
+    let extension = path.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase);
+    match extension.as_deref() {
+        Some("ply") => Ok(ply::parse),
+        Some("obj") => Ok(|bytes| obj::parse(bytes).map(Geometry::Mesh)),
+        Some("stl") => Ok(|bytes| stl::parse(bytes).map(Geometry::Mesh)),
+        _ => Err(ReadError::Extension { path: path.to_path_buf() }),
+    }
 }
 
 /// The file's bytes, or one more than are allowed.

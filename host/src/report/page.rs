@@ -28,6 +28,9 @@ const TEMPLATE: &str = include_str!("page/page.html");
 const STYLE: &str = include_str!("page/page.css");
 const SCRIPT: &str = include_str!("page/page.js");
 
+/// What stands in the head of a page, and says whose it is.
+pub(crate) const MARK: &str = "<meta name=\"generator\" content=\"Ossature\">";
+
 /// Layers that are shown at first.
 const SHOWN: [&str; 3] = ["grey", "contour", "skeleton"];
 
@@ -216,7 +219,7 @@ mod tests {
     fn a_page_names_no_address_and_keeps_its_policy() {
         let own = own(&page(&Capsule::new(Mode::Default, Record::new()), "a <b> \"cup\""));
         assert!(own.contains("<title>a &lt;b&gt; &quot;cup&quot;</title>"));
-        assert!(own.contains("default-src 'none'"));
+        assert!(own.contains("default-src 'none'") && own.contains(MARK));
         for address in ["http:", "https:", "src=\"/", "//cdn"] {
             let known = own.replace("http://www.w3.org/", "");
             assert!(!known.contains(address), "{address}");

@@ -128,11 +128,20 @@ pub fn load(path: &Path) -> Result<Loaded, PictureError> {
     if fs::metadata(path).map_err(io_error)?.len() > MAX_FILE {
         return Err(PictureError::TooLarge { path: path.into() });
     }
-    let bytes = fs::read(path).map_err(io_error)?;
-    let reader = ImageReader::new(Cursor::new(bytes.as_slice())).with_guessed_format().map_err(io_error)?;
+    parse(path, &fs::read(path).map_err(io_error)?)
+}
+
+/// Reads the image in the bytes of a file, which errors call `path`.
+///
+/// # Errors
+///
+/// See [`PictureError`].
+pub fn parse(path: &Path, bytes: &[u8]) -> Result<Loaded, PictureError> {
+    let io_error = |source| PictureError::Io { path: path.into(), source };
+    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(io_error)?;
     let warning = match reader.format() {
         None => return Err(PictureError::Unknown { path: path.into() }),
-        Some(ImageFormat::Jpeg) => jpeg_damage(path, &bytes)?,
+        Some(ImageFormat::Jpeg) => jpeg_damage(path, bytes)?,
         Some(_) => None,
     };
     let picture = decode(path, reader)?;

@@ -97,7 +97,7 @@ fn nearness(focal: i32, rho: i32) -> i64 {
     // In two steps of 15 bits, which f < 2^23 and rho < 2^22 keep in 64: 128 are divided bit by bit.
     let whole = (f2 + rho2).max(1);
     let (high, rest) = ((f2 << 15) / whole, (f2 << 15) % whole);
-    (high << 15 | (rest << 15) / whole).cast_signed()
+    ((high << 15) | ((rest << 15) / whole)).cast_signed()
 }
 
 #[cfg(test)]

@@ -107,7 +107,9 @@ impl<'a> Hello<'a> {
         check_version(reader)?;
         let firmware = [reader.u16()?, reader.u16()?, reader.u16()?];
         let length = usize::from(reader.u8()?);
-        let board = core::str::from_utf8(reader.take(length)?).ok().filter(|name| name.len() <= MAX_BOARD);
+        // It is shown in terminals, which obey control characters.
+        let fits = |name: &&str| name.len() <= MAX_BOARD && !name.contains(char::is_control);
+        let board = core::str::from_utf8(reader.take(length)?).ok().filter(fits);
         let board = board.ok_or(WireError::Invalid("name of a board"))?;
         let sensors = [reader.u32()?, reader.u32()?];
         let picture = [reader.u16()?, reader.u16()?];

@@ -209,7 +209,7 @@ impl Browser {
     }
 
     /// Closes a page.
-    pub fn close(&mut self, page: Page) {
+    pub fn close(&mut self, page: &Page) {
         self.call(None, "Target.closeTarget", &json!({ "targetId": page.target }));
     }
 }

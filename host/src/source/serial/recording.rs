@@ -145,9 +145,17 @@ impl Recording {
     /// When it cannot be read, or is none.
     pub fn read(path: &Path) -> Result<Self, RecordingError> {
         let file = std::fs::read(path).map_err(|source| RecordingError::Io { path: path.into(), source })?;
+        Self::parse(path, &file)
+    }
+
+    /// Read the recording in the bytes of a file, which errors call `path`.
+    ///
+    /// # Errors
+    /// When it is none.
+    pub fn parse(path: &Path, file: &[u8]) -> Result<Self, RecordingError> {
         let damaged =
             |rest: &[u8]| RecordingError::Damaged { path: path.into(), at: file.len() - rest.len() };
-        let mut rest = file.strip_prefix(MAGIC).ok_or_else(|| damaged(&file))?;
+        let mut rest = file.strip_prefix(MAGIC).ok_or_else(|| damaged(file))?;
         let (mut calibration, mut connections, mut length) = (None, Vec::new(), 0);
         while let Some((head, after)) = rest.split_first_chunk::<HEAD>() {
             let [kind, t0, t1, t2, t3, t4, t5, t6, t7, l0, l1, l2, l3] = *head;

@@ -1,0 +1,185 @@
+//! The whole core on any two pictures, by any settings: it answers, its lists hang together, this machine's kernels
+//! and the portable ones agree in memory that is dirty, and a shape survives the wire.
+#![no_main]
+
+use arbitrary::Arbitrary;
+use fuzz::figure::{Figure, draw};
+use host::memory::Storage;
+use libfuzzer_sys::fuzz_target;
+use oracle::wire::{Lists, check};
+use shared::bitmap::{Grey, Size, WORD_BITS};
+use shared::fixed::PX;
+use shared::pipeline::{self, Finding, Kernels, Memory, Outcome, Settings};
+use shared::stage::binarise::{Polarity, Threshold};
+use shared::stage::correspond::PaperMatching;
+use shared::stage::depth::Optics;
+use shared::stage::thinning::Rule;
+use shared::wire::{Frame, PairReport, Shape, ToHost};
+use std::cell::RefCell;
+
+#[derive(Arbitrary, Debug)]
+struct Case {
+    /// 0 to 96, or as far from an edge of words.
+    size: [u8; 2],
+    at_word: bool,
+    shift: u8,
+    scene: Vec<Figure>,
+    right_only: Option<Figure>,
+    choice: Choice,
+}
+
+#[derive(Arbitrary, Debug)]
+struct Choice {
+    device: bool,
+    paper: Option<(u8, u16)>,
+    median: bool,
+    sub_pixel: bool,
+    level: Option<u8>,
+    polarity: u8,
+    rule: u8,
+    optics: u8,
+}
+
+impl Choice {
+    fn settings(&self) -> Settings {
+        let optics = [
+            Optics { focal: 750 * PX, disparity_offset: 0 },
+            Optics { focal: 1, disparity_offset: 1 << 20 },
+            Optics { focal: 1 << 22, disparity_offset: -(1 << 20) },
+        ][usize::from(self.optics % 3)];
+        if self.device {
+            return Settings::device(optics);
+        }
+        let chosen = match self.paper {
+            None => Settings::new(optics),
+            Some((omega, threshold)) => {
+                let omega = 1 + usize::from(omega % 3);
+                Settings::paper(optics, PaperMatching { omega, threshold: i32::from(threshold) << 15 })
+            }
+        };
+        Settings {
+            median: self.median,
+            sub_pixel: self.sub_pixel,
+            threshold: self.level.map_or(Threshold::Otsu, Threshold::Fixed),
+            polarity: [Polarity::BrightObject, Polarity::DarkObject, Polarity::Auto]
+                [usize::from(self.polarity % 3)],
+            thinning: [Rule::HitOrMiss, Rule::ZhangSuen, Rule::GuoHall, Rule::EdtOrdered]
+                [usize::from(self.rule % 4)],
+            ..chosen
+        }
+    }
+}
+
+/// Memories as earlier runs left them, lists for a shape that came over the wire, and room for its frame.
+struct Desk {
+    memories: [Storage; 2],
+    lists: Lists,
+    frame: Vec<u8>,
+}
+
+thread_local! {
+    static DESK: RefCell<Desk> = RefCell::new(Desk {
+        memories: Default::default(),
+        lists: Lists::default(),
+        frame: vec![0; 1 << 20],
+    });
+}
+
+fn side(length: u8, at_word: bool) -> usize {
+    if at_word { WORD_BITS - 2 + usize::from(length % 5) } else { usize::from(length % 97) }
+}
+
+fuzz_target!(|case: Case| {
+    let (width, height) = (side(case.size[0], case.at_word), usize::from(case.size[1] % 97));
+    let left = draw(width, height, &case.scene);
+    let right = moved(&left, width, case.shift.into(), case.right_only.as_ref());
+    let settings = case.choice.settings();
+    DESK.with_borrow_mut(|desk| {
+        let Desk { memories: [first, second], lists, frame } = desk;
+        let run = |storage: &mut Storage, portable: bool| {
+            storage.fit(width, height).expect("a small picture");
+            let grey =
+                |bytes| Grey::new(Size { width, height }, width, bytes).expect("as many bytes as pixels");
+            let mut memory = storage.lend();
+            if portable {
+                memory.kernels = Kernels::PORTABLE;
+            }
+            let answer = pipeline::run(&mut memory, grey(&left), grey(&right), &settings, &mut ());
+            if let Ok(outcome) = &answer {
+                hangs_together(&memory, outcome);
+            }
+            answer
+        };
+        let answer = run(first, false);
+        assert_eq!(run(second, true), answer);
+        assert!(!matches!(answer, Err(Finding::Capacity(_))), "there is room: {answer:?}");
+        let Ok(outcome) = answer else { return };
+        let (one, other) = (first.lend(), second.lend());
+        agree(&one, &other);
+        if case.choice.paper.is_none() || case.choice.device {
+            survive(Shape::of(&one, &outcome), lists, frame);
+        }
+    });
+});
+
+/// The left picture, seen from further right.
+fn moved(left: &[u8], width: usize, shift: usize, own: Option<&Figure>) -> Vec<u8> {
+    let mut right = left.to_vec();
+    for row in right.chunks_mut(width.max(1)) {
+        let ground = row.last().copied().unwrap_or(0);
+        let shift = shift.min(row.len());
+        row.copy_within(shift.., 0);
+        row[width - shift..].fill(ground);
+    }
+    if let Some(own) = own {
+        own.draw(width, &mut right);
+    }
+    right
+}
+
+fn hangs_together(memory: &Memory<'_>, outcome: &Outcome) {
+    assert!(outcome.areas.iter().all(|area| *area >= 1));
+    for eye in &memory.eyes {
+        let mut next = 0;
+        for l in eye.loops.iter() {
+            assert!(l.start == next && l.len >= 8);
+            next += l.len;
+        }
+        assert_eq!(next, eye.contour.len());
+        for branch in eye.branches.iter() {
+            assert!(branch.samples + branch.sample_count <= eye.samples.len());
+            assert!(branch.controls + branch.control_count <= eye.controls.len());
+        }
+    }
+    assert_eq!(memory.balls.len(), memory.depths.len());
+    assert!(memory.balls.iter().all(|ball| ball.rho > 0));
+}
+
+fn agree(one: &Memory<'_>, other: &Memory<'_>) {
+    for (a, b) in one.eyes.iter().zip(&other.eyes) {
+        assert!(a.contour == b.contour && a.loops == b.loops && a.hull == b.hull);
+        assert!(a.samples == b.samples && a.branches == b.branches && a.controls == b.controls);
+    }
+    assert!(one.matches == other.matches && one.balls == other.balls && one.depths == other.depths);
+}
+
+/// Write a shape and read it back.
+fn survive(shape: Shape<'_>, lists: &mut Lists, frame: &mut [u8]) {
+    let report = PairReport {
+        number: 1,
+        stamps: [0; 2],
+        levels: [0; 2],
+        exposures: Default::default(),
+        result: Ok(shape),
+    };
+    let len = ToHost::Pair(report).encode(1, frame).expect("room for the shape of a small picture");
+    let (kind, sequence, payload) = oracle::link::frames(&frame[..len]).pop().expect("a frame");
+    let frame = Frame { kind, sequence, repeated: false, payload: &payload };
+    match ToHost::decode(&frame, &mut lists.lend()) {
+        Ok(ToHost::Pair(PairReport { result: Ok(read), .. })) => {
+            assert_eq!(read.contour.len(), shape.contour.len());
+            check(read);
+        }
+        other => panic!("a shape came back as {:?}", other.err()),
+    }
+}
