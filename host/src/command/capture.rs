@@ -15,6 +15,9 @@
 //! models of it, byte for byte; with --only-record it makes none, and needs no calibration. --background first
 //! takes the first pair for the scene without the object.
 //!
+//! --view shows each pair on a page in the browser as it is made, where threshold, polarity, region and exposure can be
+//! set for the next one; models are then written only if --out is given. docs/live.md tells more.
+//!
 //! Succeeds if any pair gave a model (with --only-record: was recorded) and the camera did not fail.
 //! docs/capture.md tells more.
 //!
@@ -22,6 +25,7 @@
 //!   host capture --device /dev/video0 --calib calib.yaml
 //!   host capture --device /dev/video0 --focal 700 --baseline 60 --frames 20 --best --out cup
 //!   host capture --device /dev/video0 --device /dev/video2 --format MJPG --fps 15 --calib calib.yaml
+//!   host capture --device /dev/video0 --calib calib.yaml --view
 //!   host capture --device /dev/video0 --calib calib.yaml --background first --record session --seconds 30
 //!   host capture --device /dev/video0 --record board --only-record --fps 5
 
@@ -31,9 +35,12 @@ mod telling;
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
+use clap::builder::ArgPredicate;
 
 use super::options::{CameraArgs, MethodArgs, NoCalibration, SceneArgs, positive, usage};
+use super::view::ViewArgs;
 use super::{Failure, interruption, note, told};
+use crate::reconstruct::Options;
 use crate::source::v4l::choose::{Choice, Request, Size, choose};
 use crate::source::v4l::device::Device;
 use crate::source::v4l::errors::CameraError;
@@ -90,17 +97,24 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 5)]
     skip: u64,
     /// Make one model, of the best pair
-    #[arg(long)]
+    #[arg(long, conflicts_with = "view")]
     best: bool,
     /// Folder that keeps the pairs, new or empty
     #[arg(long, value_name = "DIR")]
     record: Option<PathBuf>,
     /// Make no models
-    #[arg(long, requires = "record", conflicts_with_all = ["best", "background", "roi"])]
+    #[arg(long, requires = "record", conflicts_with_all = ["best", "background", "roi", "view"])]
     only_record: bool,
+    #[command(flatten)]
+    view: ViewArgs,
     /// Folder for the results
-    #[arg(long, value_name = "DIR", default_value = "ossature-capture")]
-    out: PathBuf,
+    #[arg(
+        long,
+        value_name = "DIR",
+        default_value_if("view", ArgPredicate::IsPresent, None),
+        default_value = "ossature-capture"
+    )]
+    out: Option<PathBuf>,
     /// Draw no pictures of the stages
     #[arg(long)]
     no_pictures: bool,
@@ -113,6 +127,13 @@ pub struct Args {
     /// Print one JSON document at the end instead of text
     #[arg(long)]
     json: bool,
+}
+
+impl Args {
+    /// The cameras, as a heading.
+    fn title(&self) -> String {
+        self.device.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(" ")
+    }
 }
 
 /// Layouts as they are asked for.
@@ -155,13 +176,13 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     {
         return Err(usage("both devices are the same camera: give two, or one that sees with both eyes"));
     }
-    let mut options = args.method.options()?;
+    let mut options = Options { draft: args.out.is_none(), ..args.method.options()? };
     let prepared = told(args.json, {
         let scene = args.scene.scene(None, args.swap, &mut options);
         scene.and_then(|scene| Ok((scene, open(args, layout)?, interruption()?)))
     });
-    let (scene, rig, stop) = prepared?;
-    let session = told(args.json, Session::begin(args, &options, scene, &rig))?;
+    let (scene, mut rig, stop) = prepared?;
+    let session = told(args.json, Session::begin(args, &options, scene, &mut rig))?;
     session.run(rig, &stop)
 }
 
@@ -201,9 +222,11 @@ fn open(args: &Args, layout: Option<Layout>) -> Result<Rig<Kernel>, Failure> {
     let second = second.map(|(kernel, _)| kernel);
     let file = file.map(|(_, path)| path.to_path_buf());
     let (layout, swap) = (choice.layout, args.swap);
-    let formats = [Some(&first), second.as_ref()].into_iter().flatten().map(Kernel::format).collect();
+    let cameras = || [Some(&first), second.as_ref()].into_iter().flatten();
+    let formats = cameras().map(Kernel::format).collect();
+    let dials = if args.view.is_wanted() { cameras().filter_map(Kernel::dial).collect() } else { Vec::new() };
     let optics = Optics { formats, layout, swap };
-    Ok(Rig { pairs: Pairs::of(first, second), optics, calibration, file })
+    Ok(Rig { pairs: Pairs::of(first, second), optics, calibration, file, dials })
 }
 
 /// What a camera was set to.

@@ -66,7 +66,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         options: &reconstruct::Options::default(),
         pictures: true,
         truth: Some(&scene.truth),
-        place: Place { folder: &folder, report: args.json, page: !args.no_report },
+        place: Place { folder: Some(&folder), report: args.json, page: !args.no_report },
     };
     let (model, made) = model::make_and_keep(order, &mut Workspace::default())?;
     let found = measure(&made.mesh, &scene);

@@ -9,6 +9,9 @@
 //! starts anew is waited for. It goes on until --frames pairs have come, --seconds have passed, or Ctrl-C, which
 //! ends after the model at hand; a second one ends at once.
 //!
+//! --view shows each pair on a page in the browser, where threshold, polarity and exposure can be set, which the device is
+//! then told; models are written only if --out is given. docs/live.md tells more.
+//!
 //! --record keeps what came, byte for byte; `host replay FILE` makes the same models of it again.
 //!
 //! With --json, every pair is a line of JSON when it is done, and the last line is about the link.
@@ -16,30 +19,37 @@
 //! Examples:
 //!   host listen --calib calib.yaml
 //!   host listen --port /dev/ttyACM0 --calib calib.yaml --frames 10 --out models
+//!   host listen --calib calib.yaml --view
 //!   host listen --port unix:/tmp/camera --calib calib.yaml --record cup.link --json
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
+use clap::builder::ArgPredicate;
 use indicatif::ProgressBar;
 use serde_json::{Value, json};
 use shared::camera::PairModel;
 use shared::stage::binarise::{Polarity, Threshold};
-use shared::wire::{Decoder, MAX_FRAME, ToDevice};
+use shared::wire::{self, Decoder, ExposureSetting, MAX_FRAME, ToDevice};
 
 use super::connect::{
     PortArgs, check_calibration, hello_as_json, link_as_json, link_in_words, model_of, progress, version,
 };
-use super::model::{self, Model, Place};
+use super::model::{self, Model, NoModel, Place};
 use super::options::GrowArgs;
 use super::table::{count, sides};
 use super::timings::Timings;
+use super::view::{self, Beside, Pace, ViewArgs};
 use super::{Failure, interruption, note, say, words_of};
-use crate::reconstruct::{Options, Refusal, Workspace};
+use crate::live::View;
+use crate::live::control::{Limits, Settings};
+use crate::reconstruct::{Options, Workspace};
+use crate::report::record::Record;
 use crate::report::words::{parse_polarity, parse_threshold};
+use crate::source::exposure::{Exposure, Range};
 use crate::source::serial::inbox::{Hello, Inbox, Message, Pair};
 use crate::source::serial::link::frames;
 use crate::source::serial::recording::{Recording, Writer};
@@ -47,6 +57,11 @@ use crate::source::serial::session::{Session, SessionError, Tally};
 
 /// Longest that is waited for a frame before time is looked at.
 const LOOK: Duration = Duration::from_millis(250);
+
+/// Lines that a device's sensors can expose.
+const LINES: Range = Range { least: 1, most: 670, unit: "lines", auto: true };
+/// What a line of a sensor is amplified by before a pair has come that says so, 1/256.
+const GAIN: u16 = 256;
 
 /// Arguments of `listen`.
 #[derive(Debug, clap::Args)]
@@ -73,9 +88,16 @@ pub struct Args {
     /// Keep what comes in a new file
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
+    #[command(flatten)]
+    view: ViewArgs,
     /// Folder for the results
-    #[arg(long, value_name = "DIR", default_value = "ossature-out")]
-    out: PathBuf,
+    #[arg(
+        long,
+        value_name = "DIR",
+        default_value_if("view", ArgPredicate::IsPresent, None),
+        default_value = "ossature-out"
+    )]
+    out: Option<PathBuf>,
     /// Tell on standard error how long each stage took
     #[arg(long)]
     timings: bool,
@@ -94,13 +116,21 @@ pub struct Args {
 /// If there is no device, its calibration is another, or no pair gives a model.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let model = model_of(&args.calib)?;
-    let options = args.grow.device_options();
+    let options = Options { draft: args.out.is_none(), ..args.grow.device_options() };
     let wanted = Wanted { page: args.report, json: args.json, timings: args.timings };
-    let mut desk = Desk::new((&model, &options), &args.out, wanted);
+    let asked = Settings {
+        threshold: args.threshold.unwrap_or_default(),
+        polarity: args.polarity.unwrap_or_default(),
+        ..Settings::default()
+    };
+    let view = args.view.open("a camera device", asked, limits)?;
+    let mut desk = Desk::new((&model, &options), (args.out.as_deref(), wanted), view);
     let end = args.seconds.map(|seconds| Instant::now() + Duration::from_secs(seconds.into()));
     let stop = interruption()?;
     let mut session = begin(args, &model, &mut desk)?;
-    let heard = listen(args, &mut session, &mut desk, || {
+    let (threshold, polarity) = (args.threshold, args.polarity);
+    let mut orders = Orders { threshold, polarity, exposure: None, settings: asked };
+    let heard = listen(args, (&mut session, &mut orders), &mut desk, || {
         stop.load(Ordering::Relaxed) || end.is_some_and(|end| Instant::now() >= end)
     });
     // The device may be gone; it stops by itself when it starts anew.
@@ -128,13 +158,17 @@ fn begin(args: &Args, model: &PairModel, desk: &mut Desk<'_>) -> Result<Session,
 
 fn listen(
     args: &Args,
-    session: &mut Session,
+    (session, orders): (&mut Session, &mut Orders),
     desk: &mut Desk<'_>,
     over: impl Fn() -> bool,
 ) -> Result<(), Failure> {
     let mut started = false;
     while args.frames.is_none_or(|frames| desk.pairs < frames) && !over() {
-        let came = if started { session.receive(LOOK) } else { start(args, session).map(|()| None) };
+        let came = if started {
+            orders.follow(session, desk).and_then(|()| session.receive(LOOK))
+        } else {
+            orders.start(session).map(|()| None)
+        };
         started = true;
         match came {
             Ok(Some((message, first))) => {
@@ -143,7 +177,8 @@ fn listen(
                     desk.greeted(hello)?;
                     started = false;
                 }
-                desk.take(session.inbox(), message)?;
+                let lost = session.tally().frames.missing;
+                desk.take(session.inbox(), message, lost)?;
             }
             Ok(None) => {}
             Err(error) if error.is_loss() => {
@@ -161,15 +196,65 @@ fn listen(
     Ok(())
 }
 
-/// Have a device that was greeted begin.
-fn start(args: &Args, session: &mut Session) -> Result<(), SessionError> {
-    if let Some(threshold) = args.threshold {
-        session.order(&ToDevice::Threshold(threshold))?;
+/// What can be set of a device.
+fn limits() -> Limits {
+    let region = Err("a device looks at all of its pictures");
+    Limits { threshold: Ok(()), polarity: Ok(()), region, exposure: Ok(LINES) }
+}
+
+/// What the device is to be told: nothing that nobody has said.
+struct Orders {
+    threshold: Option<Threshold>,
+    polarity: Option<Polarity>,
+    exposure: Option<ExposureSetting>,
+    /// What was set on the page when it was looked at.
+    settings: Settings,
+}
+
+impl Orders {
+    /// Has a device that was greeted begin.
+    fn start(&self, session: &mut Session) -> Result<(), SessionError> {
+        self.give(session)?;
+        session.order_cameras(&ToDevice::Start)
     }
-    if let Some(polarity) = args.polarity {
-        session.order(&ToDevice::Polarity(polarity))?;
+
+    fn give(&self, session: &mut Session) -> Result<(), SessionError> {
+        let orders = [
+            self.threshold.map(ToDevice::Threshold),
+            self.polarity.map(ToDevice::Polarity),
+            self.exposure.map(ToDevice::Exposure),
+        ];
+        orders.iter().flatten().try_for_each(|order| session.order(order))
     }
-    session.order_cameras(&ToDevice::Start)
+
+    /// Passes on what was set on the page. That the device refuses is told there and goes on.
+    fn follow(&mut self, session: &mut Session, desk: &mut Desk<'_>) -> Result<(), SessionError> {
+        let Some(view) = &desk.view else { return Ok(()) };
+        let (settings, _) = view.control().settings();
+        let before = std::mem::replace(&mut self.settings, settings);
+        if settings == before {
+            return Ok(());
+        }
+        if settings.threshold != before.threshold {
+            self.threshold = Some(settings.threshold);
+        }
+        if settings.polarity != before.polarity {
+            self.polarity = Some(settings.polarity);
+        }
+        self.exposure = settings.exposure.map(|exposure| match exposure {
+            Exposure::Auto => ExposureSetting::Auto,
+            Exposure::Fixed(lines) => ExposureSetting::Fixed(desk.gains.map(|gain| {
+                let lines = u16::try_from(lines).unwrap_or(u16::MAX);
+                wire::Exposure { lines, gain }
+            })),
+        });
+        match self.give(session) {
+            Err(error @ SessionError::Refused(_)) => desk.refusal = Some(words_of(&error)),
+            Ok(()) => desk.refusal = None,
+            Err(error) => return Err(error),
+        }
+        Ok(())
+    }
 }
 
 /// What is wanted beside the models.
@@ -183,14 +268,22 @@ pub(super) struct Wanted {
     pub(super) timings: bool,
 }
 
-/// Makes the models of a recording again.
+/// Makes the models of a recording again, on a live page at a rate if there is one.
 ///
 /// # Errors
 ///
 /// If the recording cannot be read, or no pair gives a model.
-pub(super) fn replay(path: &Path, options: &Options, out: &Path, wanted: Wanted) -> Result<(), Failure> {
+pub(super) fn replay(
+    path: &Path,
+    options: &Options,
+    place: (Option<&Path>, Wanted),
+    view: Option<(View, Option<f64>)>,
+) -> Result<(), Failure> {
     let recording = Recording::read(path)?;
-    let mut desk = Desk::new((&recording.calibration, options), out, wanted);
+    let (view, rate) = view.map_or((None, None), |(view, rate)| (Some(view), rate));
+    let stop = if view.is_some() { interruption()? } else { Arc::default() };
+    let mut pace = Pace::new(rate);
+    let mut desk = Desk::new((&recording.calibration, options), place, view);
     let (mut inbox, mut tally) = (Inbox::new()?, Tally::default());
     for (k, bytes) in recording.connections.iter().enumerate() {
         let mut buffer = vec![0; MAX_FRAME];
@@ -205,7 +298,12 @@ pub(super) fn replay(path: &Path, options: &Options, out: &Path, wanted: Wanted)
                     greeted = true;
                     desk.greeted(&hello)?;
                 }
-                Ok(message) if greeted => desk.take(&mut inbox, message)?,
+                Ok(message) if greeted && !stop.load(Ordering::Relaxed) => {
+                    if matches!(message, Message::Pair(_)) {
+                        pace.wait(&stop);
+                    }
+                    desk.take(&mut inbox, message, 0)?;
+                }
                 Ok(_) => {}
                 Err(_) => tally.unreadable = tally.unreadable.saturating_add(1),
             }
@@ -213,6 +311,7 @@ pub(super) fn replay(path: &Path, options: &Options, out: &Path, wanted: Wanted)
         tally.add(decoder.counters());
         tally.reconnections = u32::try_from(k).unwrap_or(u32::MAX);
     }
+    desk.hold(&stop);
     desk.close(&tally)
 }
 
@@ -220,9 +319,16 @@ pub(super) fn replay(path: &Path, options: &Options, out: &Path, wanted: Wanted)
 struct Desk<'a> {
     model: &'a PairModel,
     options: &'a Options,
-    out: &'a Path,
+    /// None if models are only looked at.
+    out: Option<&'a Path>,
     page: bool,
     json: bool,
+    /// The live page, if it is wanted.
+    view: Option<View>,
+    /// Of both eyes in the last pair, 1/256.
+    gains: [u16; 2],
+    /// What the device refused of what was set on the page last.
+    refusal: Option<String>,
     /// If they are wanted.
     timings: Option<Timings>,
     workspace: Workspace,
@@ -233,11 +339,40 @@ struct Desk<'a> {
 }
 
 impl<'a> Desk<'a> {
-    fn new((model, options): (&'a PairModel, &'a Options), out: &'a Path, wanted: Wanted) -> Self {
-        let (bar, start, workspace) = (progress(), Instant::now(), Workspace::default());
-        let timings = wanted.timings.then(Timings::begin);
-        let Wanted { page, json, .. } = wanted;
-        Self { model, options, out, page, json, timings, workspace, bar, start, pairs: 0, models: 0 }
+    fn new(
+        (model, options): (&'a PairModel, &'a Options),
+        (out, wanted): (Option<&'a Path>, Wanted),
+        view: Option<View>,
+    ) -> Self {
+        let Wanted { page, json, timings } = wanted;
+        Self {
+            model,
+            options,
+            out,
+            page,
+            json,
+            view,
+            gains: [GAIN; 2],
+            refusal: None,
+            timings: timings.then(Timings::begin),
+            workspace: Workspace::default(),
+            bar: progress(),
+            start: Instant::now(),
+            pairs: 0,
+            models: 0,
+        }
+    }
+
+    /// Keeps the last pair on the page until the end.
+    fn hold(&self, stop: &AtomicBool) {
+        let Some(view) = &self.view else { return };
+        if !stop.load(Ordering::Relaxed) {
+            self.remark("that was the last pair, which stays on the page until Ctrl-C");
+        }
+        let (_, mut version) = view.control().settings();
+        while view::wait(view, version, stop) {
+            version = view.control().settings().1;
+        }
     }
 
     /// A line to standard error.
@@ -267,13 +402,15 @@ impl<'a> Desk<'a> {
         )
     }
 
-    fn take(&mut self, inbox: &mut Inbox, message: Message) -> Result<(), Failure> {
+    /// One message; so many before it were lost.
+    fn take(&mut self, inbox: &mut Inbox, message: Message, lost: u32) -> Result<(), Failure> {
         let Message::Pair(pair) = message else { return Ok(()) };
         self.pairs += 1;
-        let folder = self.out.join(format!("{:06}", self.pairs));
+        let name = format!("{:06}", self.pairs);
+        let folder = self.out.map(|out| out.join(&name));
         let told = heading(&pair);
-        let place = Place { folder: &folder, report: self.json, page: self.page };
-        match model::receive((inbox, *pair), self.model, self.options, place, &mut self.workspace) {
+        self.gains = pair.exposures.map(|exposure| exposure.gain);
+        match self.make((inbox, *pair), (name, folder.as_deref()), lost) {
             Ok(model) => {
                 self.models += 1;
                 if let Some(timings) = &mut self.timings {
@@ -284,15 +421,19 @@ impl<'a> Desk<'a> {
                     || {
                         let (mut told, more) = (
                             told.clone(),
-                            json!({ "folder": folder.display().to_string(), "warnings": warnings, "report": model.report }),
+                            json!({
+                                "folder": folder.as_ref().map(|folder| folder.display().to_string()),
+                                "warnings": warnings,
+                                "report": model.report,
+                            }),
                         );
                         merge(&mut told, more);
                         told
                     },
-                    || described(&told, &model, warnings, &folder),
+                    || described(&told, &model, warnings, folder.as_deref()),
                 )
             }
-            Err(failure) if failure.is::<Refusal>() => {
+            Err(failure) if failure.is::<NoModel>() => {
                 let sentence = words_of(&*failure);
                 self.line(
                     || {
@@ -305,6 +446,28 @@ impl<'a> Desk<'a> {
             }
             Err(failure) => Err(failure),
         }
+    }
+
+    /// The model of a pair, in its folder if there is one, and on the page if there is one.
+    fn make(
+        &mut self,
+        pair: (&mut Inbox, Pair),
+        (name, folder): (String, Option<&Path>),
+        lost: u32,
+    ) -> Result<Model, Failure> {
+        let arrived = Instant::now();
+        let mut record = Record::figures_only();
+        let place = Place { folder, report: self.json, page: self.page };
+        let made = model::receive(pair, (self.model, self.options), place, &mut record, &mut self.workspace);
+        let Some(view) = &mut self.view else {
+            let (model, made) = made?;
+            self.workspace.recycle(made);
+            return Ok(model);
+        };
+        let remarks = self.refusal.iter().cloned().collect();
+        let beside = Beside { name, pictures: None, remarks, dropped: lost.into(), arrived };
+        let choices = (self.model.into(), *self.options);
+        view::show((made, record), choices, beside, view, &mut self.workspace)
     }
 
     /// How it goes, on a terminal.
@@ -358,9 +521,11 @@ fn merge(into: &mut Value, from: Value) {
     }
 }
 
-fn described(told: &Value, model: &Model, warnings: &[String], folder: &Path) -> String {
-    let (pair, size, folder) = (&told["pair"], sides(model.size), folder.display());
-    let mut text = format!("pair {pair}: {size}: {folder}");
+fn described(told: &Value, model: &Model, warnings: &[String], folder: Option<&Path>) -> String {
+    let mut text = format!("pair {}: {}", told["pair"], sides(model.size));
+    if let Some(folder) = folder {
+        text.push_str(&format!(": {}", folder.display()));
+    }
     for warning in warnings {
         text.push_str(&format!("\n  warning: {warning}"));
     }

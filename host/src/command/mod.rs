@@ -47,6 +47,7 @@ pub mod replay;
 mod scene;
 mod table;
 mod timings;
+mod view;
 
 use std::error::Error;
 use std::ffi::OsString;

@@ -1,6 +1,7 @@
 //! One pair to one model: reconstructed, written, and told about.
 
 use std::path::Path;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use image::GrayImage;
@@ -17,7 +18,7 @@ use crate::output;
 use crate::reconstruct::{Options, Reconstruction, Refusal, Workspace, describe};
 use crate::report::record::Record;
 use crate::report::times::{self, Stage};
-use crate::report::{Refused, Run, words};
+use crate::report::{Refused, Run, numbers, words};
 use crate::source::serial::inbox::{Inbox, Message, Pair};
 
 /// All that a model comes from.
@@ -35,28 +36,44 @@ pub(super) struct Order<'a> {
 /// Where results go.
 #[derive(Clone, Copy)]
 pub(super) struct Place<'a> {
-    pub(super) folder: &'a Path,
+    /// None if it is only looked at.
+    pub(super) folder: Option<&'a Path>,
     /// Whether the report is wanted here as well.
     pub(super) report: bool,
     /// Whether there is to be a page about it.
     pub(super) page: bool,
 }
 
+/// That there is no model of a pair, in words, and why.
+#[derive(Clone, Debug, thiserror::Error)]
+#[error("{words}")]
+pub(super) struct NoModel {
+    words: String,
+    pub(super) refusal: Arc<Refusal>,
+}
+
+impl From<Refusal> for NoModel {
+    fn from(refusal: Refusal) -> Self {
+        Self { words: words_of(&refusal), refusal: Arc::new(refusal) }
+    }
+}
+
 impl Place<'_> {
     /// That a pair is refused, with a page about it if that is wanted. The model of an earlier one must not stand for
     /// it.
-    fn refused(&self, options: &Options, record: &Record, refusal: Refusal) -> Failure {
-        let mut words = words_of(&refusal);
-        if let Err(error) = output::clear(self.folder) {
-            words += &format!("; an earlier model stays: {}", words_of(&error));
+    fn refused(&self, options: &Options, record: &Record, refusal: Refusal) -> NoModel {
+        let mut refused = NoModel::from(refusal);
+        let Some(folder) = self.folder else { return refused };
+        let refusal = &*refused.refusal;
+        if let Err(error) = output::clear(folder) {
+            refused.words += &format!("; an earlier model stays: {}", words_of(&error));
         } else if self.page {
-            words +=
-                &match output::write_refused(self.folder, &Refused { options, record, refusal: &refusal }) {
-                    Ok(page) => format!("; {} shows it", page.display()),
-                    Err(failure) => format!("; and {}", words_of(&failure)),
-                };
+            refused.words += &match output::write_refused(folder, &Refused { options, record, refusal }) {
+                Ok(page) => format!("; {} shows it", page.display()),
+                Err(failure) => format!("; and {}", words_of(&failure)),
+            };
         }
-        words.into()
+        refused
     }
 }
 
@@ -91,18 +108,30 @@ pub(super) fn make_and_keep(
     order: Order<'_>,
     workspace: &mut Workspace,
 ) -> Result<(Model, Reconstruction), Failure> {
-    let start = Instant::now();
-    let Order { images, calibration, options, truth, .. } = order;
     let mut record = if order.pictures { Record::new() } else { Record::figures_only() };
-    let made = match workspace.reconstruct(images.each_ref(), calibration, options, &mut record) {
+    make_recorded(order, &mut record, workspace)
+}
+
+/// Reconstructs and writes, and keeps what was made and, even of a pair that is refused, what the core showed.
+pub(super) fn make_recorded(
+    order: Order<'_>,
+    record: &mut Record,
+    workspace: &mut Workspace,
+) -> Result<(Model, Reconstruction), Failure> {
+    let start = Instant::now();
+    let Order { images, calibration, options, pictures, truth, place } = order;
+    let made = match workspace.reconstruct(images.each_ref(), calibration, options, record) {
         Ok(made) => made,
         Err(refusal) => {
             record.complete(images.each_ref(), options);
-            return Err(order.place.refused(options, &record, refusal));
+            return Err(place.refused(options, record, refusal).into());
         }
     };
-    let run = Run { calibration, options, reconstruction: &made, record: &record, truth };
-    Ok((Model::written(order.place, &run, start)?, made))
+    // What a live page shows is not drawn into the folder too, unless it is wanted there.
+    let bare = (!pictures && place.folder.is_some()).then(|| record.figures());
+    let record = bare.as_ref().unwrap_or(record);
+    let run = Run { calibration, options, reconstruction: &made, record, truth };
+    Ok((Model::written(place, &run, start)?, made))
 }
 
 /// Reconstructs and writes what a device of this calibration would send of the images.
@@ -124,39 +153,44 @@ pub(super) fn make_as_device(
     let Some(Message::Pair(pair)) = pair.transpose()? else {
         return Err("the frame of a pair was lost on its way through memory".into());
     };
-    let model = receive((&mut inbox, *pair), &device, options, place, workspace)?;
+    let mut record = Record::figures_only();
+    let (model, made) = receive((&mut inbox, *pair), (&device, options), place, &mut record, workspace)?;
+    workspace.recycle(made);
     Ok(Model { time: start.elapsed(), ..model })
 }
 
-/// Reconstructs and writes what a device has sent; its shape stands in the inbox.
+/// Reconstructs and writes what a device has sent, and keeps it; its shape stands in the inbox. The record must be
+/// one of figures only.
 pub(super) fn receive(
     (inbox, pair): (&mut Inbox, Pair),
-    model: &PairModel,
-    options: &Options,
+    (model, options): (&PairModel, &Options),
     place: Place<'_>,
+    record: &mut Record,
     workspace: &mut Workspace,
-) -> Result<Model, Failure> {
+) -> Result<(Model, Reconstruction), Failure> {
     let start = Instant::now();
-    let mut record = Record::figures_only();
     let made = pair.result.map_err(Refusal::from).and_then(|outcome| {
         for (k, eye) in record.eyes.iter_mut().enumerate() {
             (eye.parts.level, eye.parts.area) = (pair.levels[k], outcome.areas[k] as usize);
         }
-        workspace.reconstruct_shape((&mut inbox.memory(), outcome), model, options, &mut record)
+        workspace.reconstruct_shape((&mut inbox.memory(), outcome), model, options, record)
     });
-    let made = made.map_err(|refusal| place.refused(options, &record, refusal))?;
+    let made = made.map_err(|refusal| place.refused(options, record, refusal))?;
     let calibration = &model.into();
-    let run = Run { calibration, options, reconstruction: &made, record: &record, truth: None };
-    let told = Model::written(place, &run, start)?;
-    workspace.recycle(made);
-    Ok(told)
+    let run = Run { calibration, options, reconstruction: &made, record, truth: None };
+    Ok((Model::written(place, &run, start)?, made))
 }
 
 impl Model {
-    /// Writes all files of a run that began at `start`.
+    /// Writes all files of a run that began at `start`, if there is a folder for them.
     fn written(place: Place<'_>, run: &Run<'_>, start: Instant) -> Result<Self, Failure> {
         let begun = Instant::now();
-        let report = output::write(place.folder, run, place.page)?;
+        let report = match place.folder {
+            Some(folder) => Some(output::write(folder, run, place.page)?),
+            None => place.report.then(|| numbers::json(run)),
+        };
+        let report =
+            report.filter(|_| place.report).map(|report| serde_json::from_slice(&report)).transpose()?;
         let mesh = &run.reconstruction.mesh;
         let bounds = mesh.bounds();
         Ok(Self {
@@ -165,7 +199,7 @@ impl Model {
             vertices: mesh.vertices.len(),
             faces: mesh.faces.len(),
             warnings: warnings(run.reconstruction),
-            report: if place.report { serde_json::from_slice(&report)? } else { serde_json::Value::Null },
+            report: report.unwrap_or_default(),
             stages: times::stages(run),
             writing: begun.elapsed(),
             time: start.elapsed(),

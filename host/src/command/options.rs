@@ -135,6 +135,7 @@ impl MethodArgs {
             threshold: self.threshold,
             polarity: self.polarity,
             cell: grow.resolution,
+            draft: false,
             scene: Known::default(),
         })
     }
@@ -248,6 +249,11 @@ impl SceneArgs {
     /// Whether anything is known.
     pub const fn is_known(&self) -> bool {
         self.background.is_some() || self.roi.is_some()
+    }
+
+    /// Whether a background is taken away.
+    pub const fn takes_background(&self) -> bool {
+        self.background.is_some()
     }
 
     /// Whether the first pair is the background.

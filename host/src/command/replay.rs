@@ -19,6 +19,9 @@
 //! Pairs are made side by side, one a core; --timings tells where their time goes. Undisturbed times are those of
 //! --jobs 1.
 //!
+//! --view shows each pair on a page in the browser as it is made, in their order, at --rate pairs a second; what is
+//! set there holds from the next pair on, and for the last one until Ctrl-C. docs/live.md tells more.
+//!
 //! --as-device makes of pictures what a camera device would make of them and send (`host listen`).
 //!
 //! INPUT may also be a recording of a camera device (`host listen --record`), which gives the models that it
@@ -31,21 +34,27 @@
 //!   host replay recordings/ --out models --no-pictures --json > models.json
 //!   host replay 'recordings/*/left.png' --polarity dark
 //!   host replay recording/ --background first --roi 100,40,400,400
+//!   host replay recording/ --view --rate 5
+
+mod follow;
 
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use clap::builder::ArgPredicate;
 use image::GrayImage;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 
 use super::listen::Wanted;
 use super::model::{self, Model, Order, Place};
-use super::options::{CameraArgs, MethodArgs, SceneArgs, usage};
+use super::options::{CameraArgs, MethodArgs, SceneArgs, positive, usage};
 use super::table::Table;
 use super::timings::Timings;
+use super::view::{self, Beside, ViewArgs};
 use super::{Failure, batch, listen, note, say, say_json, shown, told, words_of};
+use crate::live::View;
 use crate::reconstruct::{Options, Workspace};
 use crate::source::find::{Found, find};
 use crate::source::picture::PictureError;
@@ -67,7 +76,7 @@ pub struct Args {
     swap: bool,
     /// Go the way of a camera device: its rectification, its steps, what its link carries; --skeleton is nurbs
     /// and --profile device then, unless given
-    #[arg(long)]
+    #[arg(long, conflicts_with = "view")]
     as_device: bool,
     #[command(flatten)]
     cameras: CameraArgs,
@@ -76,11 +85,21 @@ pub struct Args {
     #[command(flatten)]
     method: MethodArgs,
     /// Threads, at most four a core [default: one a core]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..), conflicts_with = "view")]
     jobs: Option<u16>,
+    #[command(flatten)]
+    view: ViewArgs,
+    /// Pairs shown a second, at most [default: as fast as they are made]
+    #[arg(long, value_name = "N", value_parser = positive, requires = "view")]
+    rate: Option<f64>,
     /// Folder for the results
-    #[arg(long, value_name = "DIR", default_value = "ossature-out")]
-    out: PathBuf,
+    #[arg(
+        long,
+        value_name = "DIR",
+        default_value_if("view", ArgPredicate::IsPresent, None),
+        default_value = "ossature-out"
+    )]
+    out: Option<PathBuf>,
     /// Draw no pictures of the stages
     #[arg(long)]
     no_pictures: bool,
@@ -98,7 +117,8 @@ pub struct Args {
 /// What became of a pair.
 struct Done<'a> {
     pair: &'a Pair,
-    folder: PathBuf,
+    /// None if it was only looked at.
+    folder: Option<PathBuf>,
     result: Result<Success, Failure>,
 }
 
@@ -120,9 +140,14 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if let [input] = args.input.as_slice()
         && is_recording(Path::new(input))
     {
-        let options = recording_options(args)?;
+        let options = Options { draft: args.out.is_none(), ..recording_options(args)? };
         let wanted = Wanted { page: args.report, json: args.json, timings: args.timings };
-        return told(args.json, listen::replay(Path::new(input), &options, &args.out, wanted));
+        let place = (args.out.as_deref(), wanted);
+        let replayed = args.view.open(input, view::settings(&options), follow::limits_of_recording);
+        let replayed = replayed.map_err(Failure::from).and_then(|view| {
+            listen::replay(Path::new(input), &options, place, view.map(|view| (view, args.rate)))
+        });
+        return told(args.json, replayed);
     }
     let mut options = if args.as_device { args.method.device_options() } else { args.method.options() }?;
     let one_file = args.layout.filter(|layout| *layout != Layout::Two);
@@ -132,7 +157,16 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         scene.background = Some(told(args.json, first(args, &mut found))?);
     }
     let mut timings = Timings::begin();
-    let done = told(args.json, all(args, &options, &scene, &found))?;
+    options.draft = args.out.is_none();
+    let title = args.input.join(" ");
+    let limits = || follow::limits(&args.scene);
+    let view =
+        told(args.json, args.view.open(&title, view::settings(&options), limits).map_err(Failure::from))?;
+    let done = match view {
+        Some(view) => follow::all(args, (options, scene), &found, view),
+        None => all(args, (&options, &scene), &found),
+    };
+    let done = told(args.json, done)?;
     if args.timings {
         let made = done.iter().filter_map(|done| done.result.as_ref().ok());
         made.for_each(|success| timings.add(Some(success.loading), &success.model));
@@ -185,12 +219,7 @@ fn first(args: &Args, found: &mut Found) -> Result<[GrayImage; 2], Failure> {
 }
 
 /// Every pair, in parallel; results in the order of the pairs.
-fn all<'a>(
-    args: &Args,
-    options: &Options,
-    scene: &Scene,
-    found: &'a Found,
-) -> Result<Vec<Done<'a>>, Failure> {
+fn all<'a>(args: &Args, how: (&Options, &Scene), found: &'a Found) -> Result<Vec<Done<'a>>, Failure> {
     let pairs = &found.pairs;
     let bar = if pairs.len() > 1 && std::io::stderr().is_terminal() {
         ProgressBar::new(pairs.len() as u64)
@@ -202,23 +231,36 @@ fn all<'a>(
     }
     let job = |workspace: &mut Workspace, index: usize| {
         let pair = &pairs[index];
-        let folder = if found.single { args.out.clone() } else { args.out.join(&pair.name) };
-        let result = one(args, options, scene, (pair, &folder), workspace);
-        let result = result.map_err(|failure| with_guess(pair, failure));
+        let done = one(args, how, (found, pair), workspace, None);
         bar.inc(1);
-        Done { pair, folder, result }
+        done
     };
     let done = batch::run(pairs.len(), args.jobs.map(usize::from), &job)?;
     bar.finish_and_clear();
     Ok(done)
 }
 
-fn one(
+/// One pair, shown if there is a page for it.
+fn one<'a>(
     args: &Args,
-    options: &Options,
-    scene: &Scene,
-    (pair, folder): (&Pair, &Path),
+    how: (&Options, &Scene),
+    (found, pair): (&Found, &'a Pair),
     workspace: &mut Workspace,
+    view: Option<&mut View>,
+) -> Done<'a> {
+    let in_out = |out: &PathBuf| if found.single { out.clone() } else { out.join(&pair.name) };
+    let folder = args.out.as_ref().map(in_out);
+    let result = attempt(args, how, (pair, folder.as_deref()), workspace, view);
+    let result = result.map_err(|failure| with_guess(pair, failure));
+    Done { pair, folder, result }
+}
+
+fn attempt(
+    args: &Args,
+    (options, scene): (&Options, &Scene),
+    (pair, folder): (&Pair, Option<&Path>),
+    workspace: &mut Workspace,
+    view: Option<&mut View>,
 ) -> Result<Success, Failure> {
     let start = Instant::now();
     let mut views = pair.load()?;
@@ -227,16 +269,25 @@ fn one(
     }
     let Views { images, warnings } = views;
     let make = || {
-        let (calibration, beside) = args.cameras.of(pair, &images[0])?;
+        let (calibration, file) = args.cameras.of(pair, &images[0])?;
+        let pictures = view.is_some().then(|| images.clone());
         let (images, calibration) = scene.apply(images, &calibration)?;
         let (loading, place) = (start.elapsed(), Place { folder, report: args.json, page: args.report });
         if args.as_device {
             let model = model::make_as_device(images, &calibration, options, place, workspace)?;
-            return Ok((loading, model, beside));
+            return Ok((loading, model, file));
         }
-        let pictures = !args.no_pictures;
-        let order = Order { images, calibration: &calibration, options, pictures, truth: None, place };
-        Ok((loading, model::make(order, workspace)?, beside))
+        let drawn = !args.no_pictures;
+        let order = Order { images, calibration: &calibration, options, pictures: drawn, truth: None, place };
+        let model = match view {
+            None => model::make(order, workspace)?,
+            Some(view) => {
+                let (name, remarks) = (pair.name.clone(), warnings.clone());
+                let beside = Beside { name, pictures, remarks, dropped: 0, arrived: start };
+                view::make(order, beside, view, workspace)?
+            }
+        };
+        Ok((loading, model, file))
     };
     let (loading, model, calibration) = make().map_err(|failure| with_warnings(&warnings, failure))?;
     let warnings = warnings.into_iter().chain(model.warnings.iter().cloned()).collect();
@@ -276,7 +327,9 @@ fn as_text(done: &[Done<'_>], found: &Found) -> String {
             table.warning(warning);
         }
         table.row("time", &format!("{:.2} s", success.model.time.as_secs_f64()));
-        table.row("files", &shown(folder));
+        if let Some(folder) = folder {
+            table.row("files", &shown(folder));
+        }
         text.push_str(table.text());
     }
     if !found.single {
@@ -294,7 +347,7 @@ fn as_json(done: &[Done<'_>], found: &Found) -> serde_json::Value {
     let pair = |Done { pair, folder, result }: &Done<'_>| match result {
         Ok(Success { model, warnings, calibration, .. }) => json!({
             "name": pair.name,
-            "folder": shown(folder),
+            "folder": folder.as_deref().map(shown),
             "calibration_found": calibration.as_deref().map(shown),
             "warnings": warnings,
             "report": model.report,

@@ -94,6 +94,8 @@ pub struct Options {
     pub polarity: binarise::Polarity,
     /// Grid spacing of the mesh, mm; by default two to three pixels at the object, by the thickness of its limbs.
     pub cell: Option<f64>,
+    /// Whether the mesh is to be looked at alone: then by default twice as coarse, a quarter of the faces.
+    pub draft: bool,
     /// What was done to the images before they came here; told in the report.
     pub scene: Known,
 }

@@ -129,7 +129,8 @@ impl Workspace {
         let Solid { outcome, camera, resampled } = solid;
         let cones = &self.growth.cones;
         self.radii.clone_from(&self.growth.skeleton.radii);
-        let cell = options.cell.unwrap_or_else(|| default_cell(&camera, cones, &mut self.radii));
+        let coarser = if options.draft { 2.0 } else { 1.0 };
+        let cell = options.cell.unwrap_or_else(|| coarser * default_cell(&camera, cones, &mut self.radii));
         self.mesher.surface(cones, cell, &mut self.mesh)?;
         let dropped = self.bodies.keep_largest(&mut self.mesh);
         self.clock.lap("surface");

@@ -133,12 +133,39 @@ impl Content {
     /// As a page.
     #[must_use]
     pub fn html(&self) -> String {
-        let data = within_script(&self.json());
-        let title = escaped(&self.title);
-        let values =
-            [("title", &*title), ("style", STYLE), ("data", &data), ("plotly", plotly()), ("script", SCRIPT)];
-        fill(TEMPLATE, &values)
+        filled(&self.title, &self.json(), &Live::default())
     }
+}
+
+/// What a live page has beyond a report.
+#[derive(Default)]
+pub(crate) struct Live<'a> {
+    /// What it may ask for, as a directive of its content security policy.
+    pub(crate) policy: &'a str,
+    pub(crate) style: &'a str,
+    /// What stands above the gates, HTML.
+    pub(crate) controls: &'a str,
+    pub(crate) script: &'a str,
+}
+
+/// A page called `title` that waits for its first content.
+pub(crate) fn live(title: &str, live: &Live<'_>) -> String {
+    filled(title, "null", live)
+}
+
+fn filled(title: &str, data: &str, live: &Live<'_>) -> String {
+    fill(
+        TEMPLATE,
+        &[
+            ("title", &escaped(title)),
+            ("policy", live.policy),
+            ("style", &[STYLE, live.style].concat()),
+            ("live", live.controls),
+            ("data", &within_script(data)),
+            ("plotly", plotly()),
+            ("script", &[SCRIPT, live.script].concat()),
+        ],
+    )
 }
 
 /// The layers that show why a finding refuses.

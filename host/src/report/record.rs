@@ -174,6 +174,15 @@ impl Record {
     }
 }
 
+impl Record {
+    /// A copy without rasters.
+    #[must_use]
+    pub fn figures(&self) -> Self {
+        let eyes = self.eyes.each_ref().map(|eye| Eye { parts: eye.parts.clone(), rasters: None });
+        Self { eyes, pair: self.pair.clone(), laps: self.laps.clone(), last: self.last }
+    }
+}
+
 impl Default for Record {
     fn default() -> Self {
         Self::new()

@@ -8,6 +8,7 @@
 //! * A region cuts both views to the same rectangle; principal points move with it, so the model stays where
 //!   it was. What is outside counts neither for the threshold nor for the background's tone.
 
+use std::fmt;
 use std::path::Path;
 use std::str::FromStr;
 
@@ -33,6 +34,22 @@ pub struct Region {
     pub width: u32,
     /// Rows.
     pub height: u32,
+}
+
+impl Region {
+    /// Whether all of it lies in views of this size, px.
+    #[must_use]
+    pub fn is_within(&self, width: u32, height: u32) -> bool {
+        let ends =
+            |start: u32, length: u32, side: u32| start.checked_add(length).is_some_and(|end| end <= side);
+        ends(self.x, self.width, width) && ends(self.y, self.height, height)
+    }
+}
+
+impl fmt::Display for Region {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{},{},{},{}", self.x, self.y, self.width, self.height)
+    }
 }
 
 impl FromStr for Region {
@@ -183,8 +200,8 @@ fn take_away(eye: &'static str, view: &mut GrayImage, background: &GrayImage) ->
 
 fn cut(region: &Region, view: &GrayImage, camera: Camera) -> Result<(GrayImage, Camera), SceneError> {
     let Region { x, y, width, height } = *region;
-    let (right, bottom) = (u64::from(x) + u64::from(width), u64::from(y) + u64::from(height));
-    if right > u64::from(view.width()) || bottom > u64::from(view.height()) {
+    if !region.is_within(view.width(), view.height()) {
+        let (right, bottom) = (u64::from(x) + u64::from(width), u64::from(y) + u64::from(height));
         return Err(SceneError::Region { right, bottom, width: view.width(), height: view.height() });
     }
     let (cx, cy) = (camera.cx - f64::from(x), camera.cy - f64::from(y));

@@ -111,7 +111,8 @@ impl Browser {
 
     /// Opens a page and waits until it has loaded.
     pub fn open(&mut self, address: &str, sight: Sight) -> Page {
-        let made = self.call(None, "Target.createTarget", &json!({ "url": "about:blank" }));
+        let made =
+            self.call(None, "Target.createTarget", &json!({ "url": "about:blank", "newWindow": true }));
         let target = made["targetId"].as_str().unwrap().to_owned();
         let attach = json!({ "targetId": target, "flatten": true });
         let session =
@@ -132,7 +133,8 @@ impl Browser {
         page
     }
 
-    fn lead(&mut self, page: &Page, method: &str, params: &Value) -> Value {
+    /// The answer of a page to a command of the protocol.
+    pub fn lead(&mut self, page: &Page, method: &str, params: &Value) -> Value {
         self.call(Some(&page.session), method, params)
     }
 

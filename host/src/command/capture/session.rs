@@ -8,19 +8,27 @@ use std::time::{Duration, Instant};
 use image::GrayImage;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::super::model::{self, Model, Order, Place, warnings};
+use super::super::model::{self, Model, NoModel, Order, Place, warnings};
 use super::super::options::NoCalibration;
 use super::super::table::{count, sides};
 use super::super::timings::Timings;
+use super::super::view::{self, Beside};
 use super::super::{Failure, say, say_json, words_of};
 use super::Args;
 use crate::calibration::StereoCamera;
-use crate::reconstruct::{Options, Refusal, Workspace};
+use crate::live::View;
+use crate::live::control::{Limits, Settings};
+use crate::reconstruct::{Options, Workspace};
+use crate::source::exposure::Exposure;
 use crate::source::recording::Recording;
 use crate::source::scene::Scene;
 use crate::source::v4l::device::{Device, now};
+use crate::source::v4l::dial::Dial;
 use crate::source::v4l::live::{self, Live, Optics, Tally};
 use crate::source::v4l::pair::Pairs;
+
+/// Why an exposure cannot be set.
+const NO_DIAL: &str = "the camera's driver has no control for it";
 
 /// Cameras that are set, and what their pixels mean.
 pub(super) struct Rig<D> {
@@ -30,14 +38,22 @@ pub(super) struct Rig<D> {
     pub(super) calibration: Option<StereoCamera>,
     /// The file that the calibration comes from.
     pub(super) file: Option<PathBuf>,
+    /// What exposures are set by, if that is wanted.
+    pub(super) dials: Vec<Dial>,
 }
 
 /// A run.
 pub(super) struct Session<'a> {
     pub(super) args: &'a Args,
-    options: &'a Options,
+    options: Options,
     calibration: Option<StereoCamera>,
     scene: Scene,
+    /// The live page, if it is wanted.
+    view: Option<View>,
+    dials: Vec<Dial>,
+    /// What the first pair and the last one were made with.
+    first: Settings,
+    settings: Settings,
     workspace: Workspace,
     /// If they are wanted.
     timings: Option<Timings>,
@@ -80,10 +96,18 @@ impl<'a> Session<'a> {
     /// Nothing done yet. The folder of a recording must be new or empty.
     pub(super) fn begin<D>(
         args: &'a Args,
-        options: &'a Options,
+        options: &Options,
         scene: Scene,
-        rig: &Rig<D>,
+        rig: &mut Rig<D>,
     ) -> Result<Self, Failure> {
+        let (settings, dials) = (view::settings(options), std::mem::take(&mut rig.dials));
+        let limits = || Limits {
+            threshold: Ok(()),
+            polarity: view::polarity(&args.scene),
+            region: Ok(()),
+            exposure: dials.first().map(|dial| dial.range().clone()).ok_or_else(|| NO_DIAL.into()),
+        };
+        let view = args.view.open(&args.title(), settings, limits)?;
         let calibration = rig.calibration.map(|calibration| (calibration, rig.file.clone()));
         let record = |folder| Recording::begin(folder, calibration);
         let recording = args.record.as_deref().map(record).transpose()?;
@@ -93,9 +117,13 @@ impl<'a> Session<'a> {
         }
         Ok(Self {
             args,
-            options,
+            options: *options,
             calibration: rig.calibration,
             scene,
+            view,
+            dials,
+            first: settings,
+            settings,
             workspace: Workspace::default(),
             timings: args.timings.then(Timings::begin),
             recording,
@@ -113,6 +141,9 @@ impl<'a> Session<'a> {
         let (tally, result) =
             live::run(&mut rig.pairs, &rig.optics, stop, |live, tally| self.take(live, tally));
         self.bar.finish_and_clear();
+        if let Some(view) = &self.view {
+            view::tell_flags(view, &self.first);
+        }
         let best = self.make_best().unwrap_or_else(|failure| {
             self.failure.get_or_insert(failure);
             None
@@ -133,7 +164,7 @@ impl<'a> Session<'a> {
     fn take(&mut self, live: Live, tally: &Tally) -> ControlFlow<()> {
         if self.skip > 0 {
             self.skip -= 1;
-        } else if let Err(failure) = self.work_on(live) {
+        } else if let Err(failure) = self.work_on(live, tally) {
             self.failure = Some(failure);
             return ControlFlow::Break(());
         } else {
@@ -145,7 +176,7 @@ impl<'a> Session<'a> {
     }
 
     /// Records a pair and makes its model. That a pair is refused is no failure.
-    fn work_on(&mut self, live: Live) -> Result<(), Failure> {
+    fn work_on(&mut self, live: Live, tally: &Tally) -> Result<(), Failure> {
         let Live { views, gap, arrived } = live;
         if self.args.scene.takes_first() && self.scene.background.is_none() {
             if let Some(recording) = &mut self.recording {
@@ -160,13 +191,23 @@ impl<'a> Session<'a> {
         if let Some(recording) = &mut self.recording {
             recording.add(number, &views.images)?;
         }
+        let mut remarks = self.obey();
         let result = if self.args.only_record {
             Ok(Success { size: "recorded".into(), warnings: Vec::new() })
         } else if self.args.best {
             self.weigh(views.images, views.warnings.len())
         } else {
-            let folder = self.args.out.join(&name);
-            self.make(views.images, &folder)
+            remarks.splice(0..0, views.warnings.iter().cloned());
+            let folder = self.args.out.as_ref().map(|out| out.join(&name));
+            let beside = || Beside {
+                name: name.clone(),
+                pictures: Some(views.images.clone()),
+                remarks,
+                dropped: tally.dropped,
+                arrived: Instant::now().checked_sub(now().saturating_sub(arrived)).unwrap_or(self.begun),
+            };
+            let beside = self.view.is_some().then(beside);
+            self.make(views.images, folder.as_deref(), beside)
                 .map(|model| Success { size: sides(model.size), warnings: model.warnings })
         };
         let result = match result {
@@ -174,7 +215,7 @@ impl<'a> Session<'a> {
                 success.warnings.splice(0..0, views.warnings);
                 Ok(success)
             }
-            Err(failure) if failure.is::<Refusal>() => Err(words_of(&*failure)),
+            Err(failure) if failure.is::<NoModel>() => Err(words_of(&*failure)),
             Err(failure) => return Err(failure),
         };
         self.done.push(Done { name, result, latency: now().saturating_sub(arrived), gap });
@@ -187,18 +228,44 @@ impl<'a> Session<'a> {
         Ok(self.scene.apply(views, calibration)?)
     }
 
-    /// The model of a pair, in its folder.
-    fn make(&mut self, views: [GrayImage; 2], folder: &Path) -> Result<Model, Failure> {
+    /// Does what was set on the page; returns what the cameras say to that.
+    fn obey(&mut self) -> Vec<String> {
+        let Some(view) = &self.view else { return Vec::new() };
+        let (settings, _) = view.control().settings();
+        let exposure = settings.exposure.filter(|_| settings.exposure != self.settings.exposure);
+        self.settings = settings;
+        view::obey(&settings, &mut self.options, &mut self.scene);
+        let Some(exposure) = exposure else { return Vec::new() };
+        let told = |dial: &mut Dial| match (exposure, dial.set(exposure)) {
+            (_, Err(error)) => Some(format!("the camera refuses the exposure: {error}")),
+            (Exposure::Fixed(asked), Ok(Some(took))) if took != i64::from(asked) => {
+                Some(format!("the camera took an exposure of {took}, not {asked}"))
+            }
+            _ => None,
+        };
+        self.dials.iter_mut().filter_map(told).collect()
+    }
+
+    /// The model of a pair, in its folder if there is one, and on the page.
+    fn make(
+        &mut self,
+        views: [GrayImage; 2],
+        folder: Option<&Path>,
+        beside: Option<Beside>,
+    ) -> Result<Model, Failure> {
         let (images, calibration) = self.seen(views)?;
         let order = Order {
             images,
             calibration: &calibration,
-            options: self.options,
+            options: &self.options,
             pictures: !self.args.no_pictures,
             truth: None,
             place: Place { folder, report: self.args.json && self.args.best, page: self.args.report },
         };
-        let model = model::make(order, &mut self.workspace)?;
+        let model = match (beside, &mut self.view) {
+            (Some(beside), Some(view)) => view::make(order, beside, view, &mut self.workspace)?,
+            _ => model::make(order, &mut self.workspace)?,
+        };
         if let Some(timings) = &mut self.timings {
             timings.add(None, &model);
         }
@@ -208,7 +275,8 @@ impl<'a> Session<'a> {
     /// Keeps a pair if it is the best so far; the first of equals stays. So many of its frames were damaged.
     fn weigh(&mut self, views: [GrayImage; 2], damaged: usize) -> Result<Success, Failure> {
         let (seen, calibration) = self.seen(views.clone())?;
-        let made = self.workspace.reconstruct(seen.each_ref(), &calibration, self.options, &mut ())?;
+        let made = self.workspace.reconstruct(seen.each_ref(), &calibration, &self.options, &mut ());
+        let made = made.map_err(NoModel::from)?;
         let warnings = warnings(&made);
         let rows = made.outcome.rows;
         let worth = (damaged + warnings.len(), f64::from(rows.unmatched) / f64::from(rows.crossings.max(1)));
@@ -223,7 +291,7 @@ impl<'a> Session<'a> {
     /// Makes the model of the best pair, if that is what is wanted.
     fn make_best(&mut self) -> Result<Option<(String, Model)>, Failure> {
         let Some(best) = self.best.take() else { return Ok(None) };
-        let model = self.make(best.views, &self.args.out)?;
+        let model = self.make(best.views, self.args.out.as_deref(), None)?;
         Ok(Some((self.done[best.index].name.clone(), model)))
     }
 

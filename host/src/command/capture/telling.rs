@@ -83,8 +83,8 @@ impl Session<'_> {
             model.tell(&mut table);
             model.warnings.iter().for_each(|warning| table.warning(warning));
         }
-        if good > 0 && !self.args.only_record {
-            table.row("files", &self.args.out.display().to_string());
+        if let Some(out) = self.args.out.as_ref().filter(|_| good > 0 && !self.args.only_record) {
+            table.row("files", &shown(out));
         }
         table.text().to_owned()
     }
@@ -112,7 +112,7 @@ impl Session<'_> {
         let losses = tally.losses;
         json!({
             "pairs": self.done.iter().map(pair).collect::<Vec<_>>(),
-            "folder": shown(&self.args.out),
+            "folder": self.args.out.as_deref().map(shown),
             "recording": self.args.record.as_deref().map(shown),
             "best": best.map(|(name, model)| json!({ "name": name, "report": model.report })),
             "dropped_pairs": tally.dropped,

@@ -238,5 +238,7 @@ function show(content) {
   onhashchange = () => { obeyAddress(); all(); };
 }
 
-show(JSON.parse(byId("data").textContent));
-if (location.hash) onhashchange();
+const first = JSON.parse(byId("data").textContent);
+// A live page has none yet.
+if (first) show(first);
+if (first && location.hash) onhashchange();

@@ -21,6 +21,7 @@ use std::time::{Duration, Instant};
 
 use v4l::buffer::{Flags, Metadata, Type};
 use v4l::capability::Flags as Capability;
+use v4l::control::{Control, Value};
 use v4l::format::FourCC;
 use v4l::fraction::Fraction;
 use v4l::frameinterval::FrameIntervalEnum;
@@ -32,6 +33,7 @@ use v4l::video::capture::Parameters;
 
 use super::choose::{Camera, Choice, Offer, Sizes, offers};
 use super::device::{Device, Frame, now};
+use super::dial::{Controls, Dial};
 use super::errors::{CameraError, Doing, errno};
 use super::format::{Format, FourCc};
 
@@ -113,6 +115,32 @@ impl Kernel {
         }
         self.period = self.device.params().ok().and_then(|params| seconds(params.interval));
         Ok(())
+    }
+}
+
+impl Kernel {
+    /// Its exposure, if it has controls for it. The node is opened once more, so that it can be set while pictures are
+    /// taken.
+    #[must_use]
+    pub fn dial(&self) -> Option<Dial> {
+        Dial::find(Knobs(v4l::Device::with_path(&self.camera.path).ok()?))
+    }
+}
+
+/// A camera's controls. What the crate says of them all at once is not asked for: it panics on a kind of control that
+/// it does not know.
+struct Knobs(v4l::Device);
+
+impl Controls for Knobs {
+    fn get(&self, id: u32) -> io::Result<i64> {
+        match self.0.control(id)?.value {
+            Value::Integer(value) => Ok(value),
+            _ => Err(ErrorKind::InvalidData.into()),
+        }
+    }
+
+    fn set(&mut self, id: u32, value: i64) -> io::Result<()> {
+        self.0.set_control(Control { id, value: Value::Integer(value) })
     }
 }
 

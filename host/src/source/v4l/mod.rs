@@ -12,6 +12,7 @@
 
 pub mod choose;
 pub mod device;
+pub mod dial;
 pub mod errors;
 pub mod format;
 #[cfg(target_os = "linux")]

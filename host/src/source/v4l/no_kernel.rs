@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use super::choose::{Camera, Choice};
 use super::device::{Device, Frame};
+use super::dial::Dial;
 use super::errors::CameraError;
 use super::format::Format;
 
@@ -26,6 +27,12 @@ impl Kernel {
     /// What it offers.
     #[must_use]
     pub fn camera(&self) -> &Camera {
+        match *self {}
+    }
+
+    /// Its exposure.
+    #[must_use]
+    pub fn dial(&self) -> Option<Dial> {
         match *self {}
     }
 

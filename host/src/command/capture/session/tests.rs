@@ -4,14 +4,19 @@ use super::*;
 use crate::command::replay;
 use crate::render::render;
 use crate::shape::Shape;
+use crate::source::v4l::dial::Controls;
 use crate::source::v4l::format::{Format, FourCc};
 use crate::source::v4l::layout::Layout;
 use crate::source::v4l::simulated::{Event, Simulated};
 use crate::view::Calibrated;
 use clap::Parser;
 use serde_json::Value;
+use std::collections::BTreeMap;
 use std::fs;
+use std::io::{self, Read, Write};
+use std::net::TcpStream;
 use std::path::Path;
+use std::sync::{Arc, Mutex};
 
 #[derive(Parser)]
 struct Line {
@@ -52,7 +57,8 @@ fn rig(script: Vec<Event>) -> Rig<Simulated> {
     // Slower than a model, so that none is dropped.
     camera.pace = Duration::from_millis(1500);
     let optics = Optics { formats: vec![format], layout: Layout::SideBySide, swap: false };
-    Rig { pairs: Pairs::of(camera, None), optics, calibration: Some(calibration()), file: None }
+    let dials = Vec::new();
+    Rig { pairs: Pairs::of(camera, None), optics, calibration: Some(calibration()), file: None, dials }
 }
 
 /// Runs `capture` on what a camera sends; the folder is made to be the results' and the recording's.
@@ -63,9 +69,9 @@ fn capture(folder: &Path, script: Vec<Vec<u8>>, more: &[&str]) -> Result<(), Str
     let Line { args } = Line::try_parse_from(fixed.iter().chain(skip).chain(more)).unwrap();
     let mut options = args.method.options().unwrap();
     let scene = args.scene.scene(None, false, &mut options).unwrap();
-    let rig =
+    let mut rig =
         rig(script.into_iter().enumerate().map(|(n, bytes)| Event::Frame(40 * n as u64, bytes)).collect());
-    let session = Session::begin(&args, &options, scene, &rig).unwrap();
+    let session = Session::begin(&args, &options, scene, &mut rig).unwrap();
     session.run(rig, &AtomicBool::new(false)).map_err(|failure| words_of(&*failure))
 }
 
@@ -142,6 +148,60 @@ fn the_best_of_a_burst_is_one_model() {
     assert_eq!(names(&folder.path().join("models")), files);
     assert!(replay_of(folder.path(), &[]).is_err(), "the third pair is empty");
     assert!(result(&folder.path().join("models")) == result(&folder.path().join("again/000002")));
+}
+
+/// The exposure of a driver, by the number of its control.
+#[derive(Clone, Default)]
+struct Knob(Arc<Mutex<BTreeMap<u32, i64>>>);
+
+impl Controls for Knob {
+    fn get(&self, id: u32) -> io::Result<i64> {
+        Ok(self.0.lock().unwrap().get(&id).copied().unwrap_or_default())
+    }
+
+    fn set(&mut self, id: u32, value: i64) -> io::Result<()> {
+        self.0.lock().unwrap().insert(id, value);
+        Ok(())
+    }
+}
+
+/// Asks a live page; returns what its answer holds.
+fn ask(address: &str, method: &str, below: &str, body: &str) -> Value {
+    let (machine, path) = address.strip_prefix("http://").unwrap().split_once('/').unwrap();
+    let mut stream = TcpStream::connect(machine).unwrap();
+    let length = body.len();
+    let head = format!("Host: {machine}\r\nConnection: close\r\nContent-Length: {length}");
+    write!(stream, "{method} /{path}{below} HTTP/1.1\r\n{head}\r\n\r\n{body}").unwrap();
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).unwrap();
+    serde_json::from_str(answer.split_once("\r\n\r\n").unwrap().1).unwrap()
+}
+
+#[test]
+fn a_live_page_shows_pairs_and_sets_the_camera() {
+    let line = ["capture", "--device", "x", "--skip", "0", "--focal", "375", "--baseline", "60", "--view"];
+    let Line { args } = Line::try_parse_from(line).unwrap();
+    assert_eq!(args.out, None, "what is only looked at leaves no files");
+    let mut options = args.method.options().unwrap();
+    let scene = args.scene.scene(None, false, &mut options).unwrap();
+    let mut rig = rig((0..4).map(|n| Event::Frame(40 * n, both_eyes(1))).collect());
+    let knob = Knob::default();
+    rig.dials = vec![Dial::find(knob.clone()).unwrap()];
+    let session = Session::begin(&args, &options, scene, &mut rig).unwrap();
+    let address = session.view.as_ref().unwrap().address().to_owned();
+    std::thread::scope(|scope| {
+        let run = scope.spawn(|| session.run(rig, &AtomicBool::new(false)).map_err(|f| words_of(&*f)));
+        let told = ask(&address, "POST", "settings", r#"{"threshold": "140", "exposure": "40"}"#);
+        assert_eq!((&told["version"], &told["exposure"]["unit"]), (&1.into(), &"× 0.1 ms".into()));
+        let mut pair = ask(&address, "GET", "pair?after=0", "");
+        if pair["number"] == 1 {
+            pair = ask(&address, "GET", "pair?after=1", "");
+        }
+        assert_eq!(pair["content"]["report"]["eyes"]["left"]["threshold_grey"], 140);
+        assert_eq!(pair["pictures"][0], serde_json::json!([320, 240]));
+        assert!(run.join().unwrap().unwrap_err().contains("unplugged"));
+    });
+    assert!(knob.0.lock().unwrap().values().any(|value| *value == 40), "the camera was told");
 }
 
 #[test]
