@@ -30,6 +30,8 @@ use tempfile::NamedTempFile;
 
 /// Sub-folder of the pictures.
 pub(crate) const PICTURES: &str = "pictures";
+/// Every figure.
+const REPORT: &str = "report.json";
 /// The page.
 const PAGE: &str = "report.html";
 /// Bytes of a page among which its mark is.
@@ -70,18 +72,18 @@ fn title(folder: &Path) -> String {
 
 /// Whether a folder holds what a run left.
 pub(crate) fn is_result(folder: &Path) -> bool {
-    ["model.ply", "report.json"].iter().all(|name| folder.join(name).is_file())
+    ["model.ply", REPORT].iter().all(|name| folder.join(name).is_file())
 }
 
-/// Removes what an earlier run left in a folder, the model first, and the folder if nothing else is in it: a pair that
-/// is refused has no model, and its folder shows none.
+/// Removes what an earlier run left in a folder, last the two files by which that is known, and the folder if nothing
+/// else is in it: a pair that is refused has no model, and its folder shows none.
 pub(crate) fn clear(folder: &Path) -> Result<(), ExportError> {
-    if !is_result(folder) {
-        return Ok(());
-    }
-    let files = ["model.ply", "skeleton.ply", "boundary.ply", PAGE].map(PathBuf::from);
-    let pictures = pictures::NAMES.iter().map(|name| Path::new(PICTURES).join(name));
-    for name in files.into_iter().chain(pictures).chain(["report.json".into()]) {
+    let page = is_ours(&folder.join(PAGE)).then(|| PathBuf::from(PAGE));
+    let results = is_result(folder).then(|| {
+        let pictures = pictures::NAMES.iter().map(|name| Path::new(PICTURES).join(name));
+        pictures.chain(["skeleton.ply", "boundary.ply", "model.ply", REPORT].map(PathBuf::from))
+    });
+    for name in page.into_iter().chain(results.into_iter().flatten()) {
         let path = folder.join(name);
         if path.is_file() {
             std::fs::remove_file(&path).map_err(|source| failed(&path, source))?;
@@ -106,7 +108,7 @@ pub(crate) fn write_together(files: &[(&Path, Vec<u8>)]) -> Result<(), ExportErr
 }
 
 /// A file beside `path` that can be moved there.
-fn beside(path: &Path, bytes: &[u8]) -> io::Result<NamedTempFile> {
+pub(crate) fn beside(path: &Path, bytes: &[u8]) -> io::Result<NamedTempFile> {
     if path.exists() && !path.is_file() {
         return Err(io::Error::other("what has that name is no file"));
     }
@@ -143,7 +145,7 @@ fn write_into(folder: &Path, run: &Run<'_>, page: bool) -> Result<Vec<u8>, Expor
     let mut names = stage.models(run.reconstruction)?;
     // Only a mesh that could be written is sound enough to be measured.
     let report = numbers::json(run);
-    names.push(stage.bytes("report.json", &report)?);
+    names.push(stage.bytes(REPORT, &report)?);
     if page {
         let title = title(folder);
         names.push(stage.bytes(PAGE, Content::of(run, &report, &title).html().as_bytes())?);

@@ -123,7 +123,7 @@ fn a_background_and_a_region_are_for_recorded_pairs_too() {
     assert_eq!(report["images"]["left_size_px"][0], 280);
     assert_eq!(report["options"]["region_px"]["x"], 20);
     let error = bad(&["replay", ".", "--background", "first", "--roi", "0,0,20,20"], 1);
-    assert!(error.contains("none of the 0 images") || error.contains("no file"), "{error}");
+    assert!(error.contains("there are no images in ."), "{error}");
     let single = run(folder.path(), &[&["replay"], &pair[..], &["--background", "first"]].concat());
     assert_eq!(single.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&single.stderr).contains("pairs after it"));

@@ -15,7 +15,8 @@ const ESCAPE: char = '\u{1b}';
 fn host(folder: &Path, args: &[&str], environment: &[(&str, &str)]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_host"));
     command.current_dir(folder).args(args).stdin(Stdio::null()).env("TERM", "xterm-256color");
-    for name in ["NO_COLOR", "CLICOLOR", "CLICOLOR_FORCE", "OSSATURE_CONFIG"] {
+    // A build machine says that it shows colours whatever the terminal is.
+    for name in ["NO_COLOR", "CLICOLOR", "CLICOLOR_FORCE", "CI", "OSSATURE_CONFIG"] {
         command.env_remove(name);
     }
     command.envs(environment.iter().copied());

@@ -274,18 +274,21 @@ impl<'a> Bitmap<'a> {
         v * self.row_words * WORD_BITS + u
     }
 
-    /// Clear the pixel at a [`place`](Self::place) if its neighbours are such; whether it was.
+    /// Clear the pixel at a [`place`](Self::place) if its neighbours are such; whether it was. Outside there is none.
     #[inline]
     pub fn clear_if(&mut self, place: usize, decide: impl Fn(u8) -> bool) -> bool {
         let (i, bit) = (place / WORD_BITS, place % WORD_BITS);
+        if i >= self.words.len() {
+            return false;
+        }
         let neighbours = if bit == 0 || bit == WORD_BITS - 1 {
             self.neighbours_apart((i % self.row_words * WORD_BITS + bit) as i32, (i / self.row_words) as i32)
         } else {
             self.neighbours_within(i, bit)
         };
         let goes = decide(neighbours);
-        if let Some(word) = self.words.get_mut(i).filter(|_| goes) {
-            *word &= !(1 << bit);
+        if goes {
+            self.words[i] &= !(1 << bit);
         }
         goes
     }

@@ -89,7 +89,7 @@ fn unpacked(word: Word) -> [u8; WORD_BITS] {
     bytes
 }
 
-/// 255 for each bit that is set.
+/// As [`unpacked`], of eight bits.
 fn unpacked_eight(bits: u8) -> [u8; 8] {
     let set = (((u64::from(bits) * ONES) & DIAGONAL) + LOW) >> 7 & ONES;
     (set * 255).to_le_bytes()

@@ -382,6 +382,17 @@ fn what_is_set_on_the_page_makes_the_next_pair() {
     assert_eq!(mask(&tab), mask(&other));
     tab.until("byId('flags').textContent === '--threshold 150'");
 
+    // What is held stays, though its window was waiting for the next pair already.
+    tab.eval("byId('hold').click()");
+    assert_eq!(program.ask("POST", "settings", r#"{"threshold": "160"}"#).0, 200);
+    other.until("content.report?.eyes.left.threshold_grey === 160");
+    thread::sleep(Duration::from_millis(1000));
+    assert_eq!(tab.eval("content.report.eyes.left.threshold_grey"), 150);
+    tab.eval("byId('hold').click()");
+    tab.until("content.report?.eyes.left.threshold_grey === 160");
+    assert_eq!(program.ask("POST", "settings", r#"{"threshold": "150"}"#).0, 200);
+    tab.until("content.report?.eyes.left.threshold_grey === 150");
+
     // A region, drawn around the object on the right view with the mouse, in that view's pixels.
     tab.eval("document.querySelectorAll('.camera')[1].scrollIntoView()");
     let script = "(() => { const m = document.querySelectorAll('.camera')[1].getScreenCTM(); \

@@ -12,8 +12,9 @@
 //!
 //! --best makes one model, of the pair of a burst with the fewest warnings and then the smallest part of the
 //! outline without counterpart. --record keeps every pair that was worked on; `host replay` makes the same
-//! models of it, byte for byte; with --only-record it makes none, and needs no calibration. --background first
-//! takes the first pair for the scene without the object.
+//! models of it, byte for byte, unless something was set on a live page in between; with --only-record it
+//! makes none, and needs no calibration. --background first takes the first pair for the scene without the
+//! object.
 //!
 //! --view shows each pair on a page in the browser as it is made, where threshold, polarity, region and exposure can be
 //! set for the next one; models are then written only if --out is given. docs/live.md tells more.

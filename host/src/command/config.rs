@@ -2,16 +2,16 @@
 //!
 //! What is not given on the command line is taken from `ossature.toml`: the one in this folder, or else in the
 //! nearest folder above it, or the file of --config or OSSATURE_CONFIG. Its names are those of the options. A table
-//! is for the command of its name ([replay], [device.grab]); what stands above the first table is for every command
+//! is for the command of its name (`replay`, `device.grab`); what stands above the first table is for every command
 //! that has the option. Switches are true or false; an option that may be given twice takes a list. A relative path
 //! starts at the folder of the file:
 //!
-//!   polarity = "dark"
-//!   calib = "rig/calib.yaml"
+//!     polarity = "dark"
+//!     calib = "rig/calib.yaml"
 //!
-//!   [capture]
-//!   device = ["/dev/video0", "/dev/video2"]
-//!   no-pictures = true
+//!     [capture]
+//!     device = ["/dev/video0", "/dev/video2"]
+//!     no-pictures = true
 //!
 //! The default is below the file, its common part below the command's table, and the file below the command line.
 //! What is typed puts aside what the file says of it, and whatever contradicts it. A switch that the file turns on is
@@ -27,7 +27,6 @@
 //!   host config -- replay left.png right.png --threshold 90
 
 use std::ffi::OsString;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::parser::ValueSource;
@@ -39,6 +38,7 @@ use super::options::usage;
 use super::table::Table;
 use super::{Everywhere, Failure, of_system, say, say_json, shown};
 use crate::config::{NAME, Place};
+use crate::output::beside;
 
 /// Arguments of `config`.
 #[derive(Debug, clap::Args)]
@@ -213,8 +213,9 @@ fn begin(path: &Path) -> Result<(), Failure> {
         }
         _ => format!("cannot write {}: {}", shown(path), of_system(&error)),
     };
-    let mut file = std::fs::File::create_new(path).map_err(told)?;
-    Ok(file.write_all(template().as_bytes()).map_err(told)?)
+    let file = beside(path, template().as_bytes()).map_err(told)?;
+    file.persist_noclobber(path).map_err(|error| told(error.error))?;
+    Ok(())
 }
 
 /// Every name, commented out, with its help.

@@ -93,12 +93,19 @@ fn result(folder: &Path, output: &Path) -> PathBuf {
 fn splines(report: &Path) -> Result<Vec<Spline>, Failure> {
     #[derive(Deserialize)]
     struct Report {
+        format: Option<String>,
         curves_mm: Option<Vec<Spline>>,
     }
     let name = report.display();
     let text = fs::read(report).map_err(|error| format!("cannot read {name}: {error}"))?;
     let report: Report =
         serde_json::from_slice(&text).map_err(|error| format!("{name} is no report.json: {error}"))?;
+    if report.format.as_deref() == Some(export::json::FORMAT) {
+        return Err(format!("{name} has the curves already: copy it").into());
+    }
+    if let Some(number) = report.curves_mm.iter().flatten().position(|curve| !curve.is_sound()) {
+        return Err(format!("curve {number} of {name} is not one: make the model again").into());
+    }
     report.curves_mm.ok_or_else(|| {
         format!(
             "{name} tells of no curves in space: it was written in paper mode, which describes each view by itself, or \

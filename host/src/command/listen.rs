@@ -10,7 +10,8 @@
 //! ends after the model at hand; a second one ends at once.
 //!
 //! --view shows each pair on a page in the browser, where threshold, polarity and exposure can be set, which the device is
-//! then told; models are written only if --out is given. docs/live.md tells more.
+//! then told; it begins with otsu and bright unless the flags say otherwise. Models are written only if --out is given.
+//! docs/live.md tells more.
 //!
 //! --record keeps what came, byte for byte; `host replay FILE` makes the same models of it again.
 //!
@@ -60,6 +61,8 @@ const LOOK: Duration = Duration::from_millis(250);
 
 /// Lines that a device's sensors can expose.
 const LINES: Range = Range { least: 1, most: 670, unit: "lines", auto: true };
+/// What a device can be told of how it looks.
+const ORDERS: [&str; 3] = ["threshold", "polarity", "exposure"];
 /// What a line of a sensor is amplified by before a pair has come that says so, 1/256.
 const GAIN: u16 = 256;
 
@@ -128,8 +131,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let end = args.seconds.map(|seconds| Instant::now() + Duration::from_secs(seconds.into()));
     let stop = interruption()?;
     let mut session = begin(args, &model, &mut desk)?;
-    let (threshold, polarity) = (args.threshold, args.polarity);
-    let mut orders = Orders { threshold, polarity, exposure: None, settings: asked };
+    let mut orders = Orders::new(args, asked);
     let heard = listen(args, (&mut session, &mut orders), &mut desk, || {
         stop.load(Ordering::Relaxed) || end.is_some_and(|end| Instant::now() >= end)
     });
@@ -167,7 +169,7 @@ fn listen(
         let came = if started {
             orders.follow(session, desk).and_then(|()| session.receive(LOOK))
         } else {
-            orders.start(session).map(|()| None)
+            orders.start(session, desk).map(|()| None)
         };
         started = true;
         match came {
@@ -204,55 +206,57 @@ fn limits() -> Limits {
 
 /// What the device is to be told: nothing that nobody has said.
 struct Orders {
-    threshold: Option<Threshold>,
-    polarity: Option<Polarity>,
-    exposure: Option<ExposureSetting>,
-    /// What was set on the page when it was looked at.
+    /// For a device that begins, one of each of [`ORDERS`]: what was asked for at first, and what it obeyed since.
+    kept: [Option<ToDevice>; ORDERS.len()],
+    /// What of the page the device was told.
     settings: Settings,
 }
 
 impl Orders {
+    /// What the flags say, and with a page all that it shows as set.
+    fn new(args: &Args, settings: Settings) -> Self {
+        let shown = args.view.is_wanted();
+        let threshold = args.threshold.or_else(|| shown.then_some(settings.threshold));
+        let polarity = args.polarity.or_else(|| shown.then_some(settings.polarity));
+        Self { kept: [threshold.map(ToDevice::Threshold), polarity.map(ToDevice::Polarity), None], settings }
+    }
+
     /// Has a device that was greeted begin.
-    fn start(&self, session: &mut Session) -> Result<(), SessionError> {
-        self.give(session)?;
+    fn start(&self, session: &mut Session, desk: &mut Desk<'_>) -> Result<(), SessionError> {
+        for (which, order) in self.kept.iter().enumerate() {
+            if let Some(order) = order {
+                desk.give(session, which, order)?;
+            }
+        }
         session.order_cameras(&ToDevice::Start)
     }
 
-    fn give(&self, session: &mut Session) -> Result<(), SessionError> {
-        let orders = [
-            self.threshold.map(ToDevice::Threshold),
-            self.polarity.map(ToDevice::Polarity),
-            self.exposure.map(ToDevice::Exposure),
-        ];
-        orders.iter().flatten().try_for_each(|order| session.order(order))
-    }
-
-    /// Passes on what was set on the page. That the device refuses is told there and goes on.
+    /// Passes on what was changed on the page.
     fn follow(&mut self, session: &mut Session, desk: &mut Desk<'_>) -> Result<(), SessionError> {
         let Some(view) = &desk.view else { return Ok(()) };
-        let (settings, _) = view.control().settings();
-        let before = std::mem::replace(&mut self.settings, settings);
-        if settings == before {
-            return Ok(());
-        }
-        if settings.threshold != before.threshold {
-            self.threshold = Some(settings.threshold);
-        }
-        if settings.polarity != before.polarity {
-            self.polarity = Some(settings.polarity);
-        }
-        self.exposure = settings.exposure.map(|exposure| match exposure {
+        let ((settings, _), before) = (view.control().settings(), self.settings);
+        let exposure = settings.exposure.filter(|_| settings.exposure != before.exposure);
+        let exposure = exposure.map(|exposure| match exposure {
             Exposure::Auto => ExposureSetting::Auto,
             Exposure::Fixed(lines) => ExposureSetting::Fixed(desk.gains.map(|gain| {
                 let lines = u16::try_from(lines).unwrap_or(u16::MAX);
                 wire::Exposure { lines, gain }
             })),
         });
-        match self.give(session) {
-            Err(error @ SessionError::Refused(_)) => desk.refusal = Some(words_of(&error)),
-            Ok(()) => desk.refusal = None,
-            Err(error) => return Err(error),
+        let changed = [
+            (settings.threshold != before.threshold).then_some(ToDevice::Threshold(settings.threshold)),
+            (settings.polarity != before.polarity).then_some(ToDevice::Polarity(settings.polarity)),
+            exposure.map(ToDevice::Exposure),
+        ];
+        for (which, order) in changed.into_iter().enumerate() {
+            if let Some(order) = order
+                && desk.give(session, which, &order)?
+            {
+                self.kept[which] = Some(order);
+            }
         }
+        // Not before: what a device did not hear, because it was lost, it is told when it is back.
+        self.settings = settings;
         Ok(())
     }
 }
@@ -327,8 +331,8 @@ struct Desk<'a> {
     view: Option<View>,
     /// Of both eyes in the last pair, 1/256.
     gains: [u16; 2],
-    /// What the device refused of what was set on the page last.
-    refusal: Option<String>,
+    /// What the device refused of what was set last: one of each of [`ORDERS`].
+    refusals: [Option<String>; ORDERS.len()],
     /// If they are wanted.
     timings: Option<Timings>,
     workspace: Workspace,
@@ -353,7 +357,7 @@ impl<'a> Desk<'a> {
             json,
             view,
             gains: [GAIN; 2],
-            refusal: None,
+            refusals: Default::default(),
             timings: timings.then(Timings::begin),
             workspace: Workspace::default(),
             bar: progress(),
@@ -366,6 +370,9 @@ impl<'a> Desk<'a> {
     /// Keeps the last pair on the page until the end.
     fn hold(&self, stop: &AtomicBool) {
         let Some(view) = &self.view else { return };
+        if self.pairs == 0 {
+            return;
+        }
         if !stop.load(Ordering::Relaxed) {
             self.remark("that was the last pair, which stays on the page until Ctrl-C");
         }
@@ -373,6 +380,25 @@ impl<'a> Desk<'a> {
         while view::wait(view, version, stop) {
             version = view.control().settings().1;
         }
+    }
+
+    /// Gives the device one of [`ORDERS`]; returns whether it obeys. With a page, a refusal is told and goes on.
+    fn give(&mut self, session: &mut Session, which: usize, order: &ToDevice) -> Result<bool, SessionError> {
+        let refusal = match session.order(order) {
+            Ok(()) => None,
+            Err(error @ SessionError::Refused(_)) if self.view.is_some() => {
+                Some(format!("{}: {}", ORDERS[which], words_of(&error)))
+            }
+            Err(error) => return Err(error),
+        };
+        if let Some(words) = &refusal
+            && refusal != self.refusals[which]
+        {
+            self.remark(words);
+        }
+        let obeys = refusal.is_none();
+        self.refusals[which] = refusal;
+        Ok(obeys)
     }
 
     /// A line to standard error.
@@ -464,7 +490,7 @@ impl<'a> Desk<'a> {
             self.workspace.recycle(made);
             return Ok(model);
         };
-        let remarks = self.refusal.iter().cloned().collect();
+        let remarks = self.refusals.iter().flatten().cloned().collect();
         let beside = Beside { name, pictures: None, remarks, dropped: lost.into(), arrived };
         let choices = (self.model.into(), *self.options);
         view::show((made, record), choices, beside, view, &mut self.workspace)

@@ -17,7 +17,7 @@ pub struct Looks {
     #[arg(long, value_name = "NAME", default_value = "plain")]
     texture: Pattern,
     /// Size of the marks, mm
-    #[arg(long, value_name = "MM", value_parser = positive, default_value_t = 10.0)]
+    #[arg(long, value_name = "MM", value_parser = within(0.1, 1000.0), default_value_t = 10.0)]
     texture_size: f64,
     /// How much darker the dark marks are; from 0.8 on they are hard to tell from the background
     #[arg(long, value_name = "FRACTION", value_parser = share_of(1.0), default_value_t = 0.4)]
@@ -26,13 +26,13 @@ pub struct Looks {
     #[arg(long, value_name = "FRACTION", value_parser = share_of(1.0), default_value_t = 0.0)]
     gloss: f64,
     /// How narrow highlights are
-    #[arg(long, value_name = "EXPONENT", value_parser = positive, default_value_t = 30.0)]
+    #[arg(long, value_name = "EXPONENT", value_parser = within(1.0, 1000.0), default_value_t = 30.0)]
     shininess: f64,
     /// The lenses' blur, standard deviation, px
     #[arg(long, value_name = "PX", value_parser = share_of(20.0), default_value_t = 0.0)]
     blur: f64,
     /// Gamma of the sensors: 2.2 for an ordinary camera
-    #[arg(long, value_name = "GAMMA", value_parser = positive, default_value_t = 1.0)]
+    #[arg(long, value_name = "GAMMA", value_parser = within(0.1, 10.0), default_value_t = 1.0)]
     gamma: f64,
     /// Brightness of the left and the right image; above 1 highlights are clipped
     #[arg(long, value_name = "LEFT,RIGHT", value_parser = gains, default_value = "1,1")]
@@ -69,6 +69,14 @@ impl Looks {
             let seed = self.seed.wrapping_mul(2).wrapping_add(eye);
             Noise { sigma: self.noise, salt_and_pepper: self.salt_and_pepper, seed }.apply(image);
         }
+    }
+}
+
+/// A number in a range.
+fn within(least: f64, most: f64) -> impl Fn(&str) -> Result<f64, String> + Clone {
+    move |text| match text.parse::<f64>() {
+        Ok(number) if (least..=most).contains(&number) => Ok(number),
+        _ => Err(format!("must be {least} to {most}")),
     }
 }
 

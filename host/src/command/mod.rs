@@ -156,8 +156,9 @@ enum Command {
 #[must_use]
 pub fn main(arguments: Vec<OsString>) -> ExitCode {
     color::choose(color::typed(&arguments));
-    let wants_json =
-        |words: &[OsString]| words.iter().take_while(|word| *word != "--").any(|word| word == "--json");
+    let wants_json = |words: &[OsString]| {
+        words.iter().take_while(|word| *word != "--").any(|word| word == "--json" || word == "--json=true")
+    };
     let (mut json, mut line) = (wants_json(&arguments), Line::default());
     let result = Line::read(arguments).map_err(Failure::from).and_then(|read| {
         line = read;

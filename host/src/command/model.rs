@@ -66,7 +66,7 @@ impl Place<'_> {
         let Some(folder) = self.folder else { return refused };
         let refusal = &*refused.refusal;
         if let Err(error) = output::clear(folder) {
-            refused.words += &format!("; an earlier model stays: {}", words_of(&error));
+            refused.words += &format!("; files of an earlier model stay: {}", words_of(&error));
         } else if self.page {
             refused.words += &match output::write_refused(folder, &Refused { options, record, refusal }) {
                 Ok(page) => format!("; {} shows it", page.display()),

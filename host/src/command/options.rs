@@ -68,7 +68,7 @@ pub struct GrowArgs {
     /// Round cones between neighbouring balls, or the balls alone [default: cones]
     #[arg(long, value_enum, hide_possible_values = true, value_name = "cones|balls")]
     surface: Option<Pieces>,
-    /// Edge length of the model's mesh, mm [default: two to three pixels at the object]
+    /// Grid spacing of the model's mesh, mm; its edges are about 0.6 of it [default: two to three pixels at the object]
     #[arg(long, value_parser = positive, value_name = "MM")]
     resolution: Option<f64>,
 }

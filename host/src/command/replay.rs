@@ -49,7 +49,7 @@ use serde_json::json;
 
 use super::listen::Wanted;
 use super::model::{self, Model, Order, Place};
-use super::options::{CameraArgs, MethodArgs, SceneArgs, positive, usage};
+use super::options::{CameraArgs, MethodArgs, SceneArgs, usage};
 use super::table::Table;
 use super::timings::Timings;
 use super::view::{self, Beside, ViewArgs};
@@ -90,7 +90,7 @@ pub struct Args {
     #[command(flatten)]
     view: ViewArgs,
     /// Pairs shown a second, at most [default: as fast as they are made]
-    #[arg(long, value_name = "N", value_parser = positive, requires = "view")]
+    #[arg(long, value_name = "N", value_parser = view::rate, requires = "view")]
     rate: Option<f64>,
     /// Folder for the results
     #[arg(

@@ -1,5 +1,6 @@
 //! `--view`: a live page beside what a command does.
 
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
@@ -17,6 +18,8 @@ use crate::reconstruct::{Options, Reconstruction, Workspace};
 use crate::report::record::Record;
 use crate::source::scene::{Known, Scene};
 
+/// Pairs a second that can be asked for.
+const RATES: RangeInclusive<f64> = 0.001..=1000.0;
 /// Longest that is waited without a look at whether to stop.
 const LOOK: Duration = Duration::from_millis(50);
 
@@ -51,6 +54,12 @@ impl ViewArgs {
 fn port(text: &str) -> Result<u16, String> {
     text.parse()
         .map_err(|_| "give a port from 1 to 65535, or none; what is no port goes before --view".into())
+}
+
+/// How many pairs a second are shown at most.
+pub(super) fn rate(text: &str) -> Result<f64, String> {
+    let rate = text.parse::<f64>().ok().filter(|rate| RATES.contains(rate));
+    rate.ok_or_else(|| format!("must be {} to {}", RATES.start(), RATES.end()))
 }
 
 /// What of a pair is not its model.
@@ -138,7 +147,7 @@ pub(super) struct Pace {
 }
 
 impl Pace {
-    /// So many steps a second, or as fast as it goes.
+    /// So many steps a second, as [`rate`] takes them, or as fast as it goes.
     pub(super) fn new(rate: Option<f64>) -> Self {
         Self { period: rate.map(|rate| Duration::from_secs_f64(1.0 / rate)), next: Instant::now() }
     }
@@ -166,4 +175,19 @@ pub(super) fn wait(view: &View, version: u64, stop: &AtomicBool) -> bool {
         }
     }
     false
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rate_is_one_that_can_be_waited_for() {
+        for text in ["0.001", "5", "1000"] {
+            Pace::new(Some(rate(text).unwrap())).wait(&AtomicBool::new(false));
+        }
+        for text in ["1e-300", "1e-19", "0", "-1", "1001", "inf", "nan", "x", ""] {
+            assert_eq!(rate(text).unwrap_err(), "must be 0.001 to 1000", "{text}");
+        }
+    }
 }

@@ -40,6 +40,18 @@ pub struct Spline {
 }
 
 impl Spline {
+    /// Whether its numbers are as many as they must be, finite, and in order.
+    #[must_use]
+    pub fn is_sound(&self) -> bool {
+        let n = self.controls.len();
+        let finite = self.controls.iter().flatten().all(|x| x.is_finite());
+        (1..n).contains(&self.degree)
+            && (self.weights.len(), self.knots.len()) == (n, n + self.degree + 1)
+            && self.knots.is_sorted()
+            && self.weights.iter().all(|weight| weight.is_finite() && *weight > 0.0)
+            && finite
+    }
+
     /// The curve of a branch, if there is one and all of it lies in front of the cameras.
     #[must_use]
     pub fn of(branch: &Branch, controls: &[Control], camera: &RectifiedCamera) -> Option<Self> {

@@ -8,6 +8,8 @@ use serde::Serialize;
 use super::{AXES, ExportError, write_bytes};
 use crate::curves::spline::Spline;
 
+/// By which such a file is known.
+pub const FORMAT: &str = "ossature-curves";
 /// Version of the fields.
 const FORMAT_VERSION: u32 = 1;
 
@@ -29,7 +31,7 @@ struct Document<'a> {
 /// If the file cannot be written.
 pub fn write_splines(path: &Path, curves: &[Spline]) -> Result<(), ExportError> {
     let document = Document {
-        format: "ossature-curves",
+        format: FORMAT,
         format_version: FORMAT_VERSION,
         unit: "mm",
         axes: AXES,

@@ -191,10 +191,11 @@ fn region(text: &str, size: Option<(u32, u32)>) -> Result<Option<Region>, String
     }
     let region: Region = text.parse()?;
     match size {
+        None => Err("no pair has come yet: its size is not known; set the region then".into()),
         Some((width, height)) if !region.is_within(width, height) => {
             Err(format!("the views are {width}x{height} px: the region must lie within"))
         }
-        _ => Ok(Some(region)),
+        Some(_) => Ok(Some(region)),
     }
 }
 
@@ -205,7 +206,7 @@ fn exposure(text: &str, range: &Range) -> Result<Exposure, String> {
         Err(_) if text == "auto" && auto => Ok(Exposure::Auto),
         _ => {
             let auto = if auto { "auto, or " } else { "" };
-            Err(format!("the camera takes {auto}{least} to {most} {unit}"))
+            Err(format!("give {auto}{least} to {most} {unit}"))
         }
     }
 }
@@ -245,6 +246,9 @@ mod tests {
     #[test]
     fn a_wish_that_cannot_be_obeyed_changes_nothing() {
         let control = control();
+        let error = control.wish(br#"{"region": "10,20,100,120"}"#).unwrap_err();
+        assert!(error.contains("no pair has come"), "{error}");
+        control.wish(br#"{"region": ""}"#).unwrap();
         control.saw((320, 240));
         for (wish, words) in [
             (r#"{"threshold": "90", "polarity": "dark"}"#, "it is so"),
@@ -252,7 +256,7 @@ mod tests {
             (r#"{"region": "10,20,400,120"}"#, "320x240"),
             (r#"{"region": "4294967295,0,20,20"}"#, "320x240"),
             (r#"{"region": "1,2,3"}"#, "X,Y,W,H"),
-            (r#"{"exposure": "0"}"#, "auto, or 1 to 500 x 0.1 ms"),
+            (r#"{"exposure": "0"}"#, "give auto, or 1 to 500 x 0.1 ms"),
             (r#"{"gain": "1"}"#, "gain"),
             ("[]", "no wish"),
             ("", "no wish"),

@@ -1,7 +1,7 @@
 //! A pair as a live page takes it: what it shows of a report, and how it came about.
 //!
 //! * **In**: what was made of a pair, or why it was refused, with everything that the core showed. **Out**: JSON,
-//!   made when the first page asks for it and kept for the others.
+//!   made when the first page asks for it and kept for the others; what is set goes with each answer, as it is then.
 
 use std::io::Cursor;
 use std::sync::{Arc, OnceLock};
@@ -13,7 +13,6 @@ use hyper::body::Bytes;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{GrayImage, ImageEncoder};
 use serde::Serialize;
-use serde_json::Value;
 
 use super::control::Control;
 use crate::calibration::StereoCamera;
@@ -54,10 +53,10 @@ pub(super) struct Frame {
     /// Of the page.
     title: Arc<str>,
     shot: Shot,
-    json: OnceLock<Bytes>,
+    json: OnceLock<Vec<u8>>,
 }
 
-/// What a page gets.
+/// What a page gets beside what is set.
 #[derive(Serialize)]
 struct Told<'a> {
     number: u64,
@@ -67,7 +66,6 @@ struct Told<'a> {
     remarks: &'a [String],
     /// The views' size, px, and both as pictures.
     pictures: Option<([u32; 2], [String; 2])>,
-    settings: Value,
     /// What the report's script shows.
     content: Content,
 }
@@ -91,12 +89,15 @@ impl Frame {
         self.shot
     }
 
-    /// What a page gets.
+    /// What a page gets: `settings`, which are those of now, before the fields of [`Told`].
     pub(super) fn json(&self, control: &Control) -> Bytes {
-        self.json.get_or_init(|| self.encoded(control)).clone()
+        let told = self.json.get_or_init(|| self.encoded());
+        let settings = control.told().to_string();
+        let fields = told.strip_prefix(b"{").unwrap_or_default();
+        [&b"{\"settings\":"[..], settings.as_bytes(), b",", fields].concat().into()
     }
 
-    fn encoded(&self, control: &Control) -> Bytes {
+    fn encoded(&self) -> Vec<u8> {
         let Shot { name, pictures, calibration, options, record, made, remarks, dropped, .. } = &self.shot;
         let content = match made {
             Ok(reconstruction) => {
@@ -114,11 +115,10 @@ impl Frame {
             pictures: pictures
                 .as_ref()
                 .map(|views| (views[0].dimensions().into(), views.each_ref().map(address))),
-            settings: control.told(),
             content,
         };
         // Plain data becomes JSON; were it not to, the page would say that it cannot read it.
-        serde_json::to_vec(&told).unwrap_or_default().into()
+        serde_json::to_vec(&told).unwrap_or_default()
     }
 }
 
@@ -135,6 +135,7 @@ fn address(image: &GrayImage) -> String {
 pub(super) mod tests {
     use super::*;
     use crate::live::control::{Limits, Settings};
+    use serde_json::Value;
 
     /// A pair that was refused before anything was seen of it.
     pub(in crate::live) fn refused(number: u64) -> Frame {
@@ -156,7 +157,7 @@ pub(super) mod tests {
     fn a_refused_pair_shows_what_the_cameras_saw_and_why() {
         let none = || Err("no");
         let limits =
-            Limits { threshold: none(), polarity: none(), region: none(), exposure: Err("no".to_owned()) };
+            Limits { threshold: Ok(()), polarity: none(), region: none(), exposure: Err("no".to_owned()) };
         let control = Control::new(Settings::default(), limits);
         let frame = refused(7);
         let told: Value = serde_json::from_slice(&frame.json(&control)).unwrap();
@@ -170,7 +171,12 @@ pub(super) mod tests {
         let address = told["pictures"][1][0].as_str().unwrap();
         let png = STANDARD.decode(address.strip_prefix("data:image/png;base64,").unwrap()).unwrap();
         assert_eq!(image::load_from_memory(&png).unwrap().into_luma8(), GrayImage::new(16, 12));
-        // The same bytes, not made again.
-        assert_eq!(frame.json(&control).as_ptr(), frame.json(&control).as_ptr());
+        assert_eq!(told["settings"]["threshold"]["value"], "otsu");
+        // Who asks later sees what is set by then; the pair is not made again.
+        let kept = frame.json.get().unwrap().as_ptr();
+        control.wish(br#"{"threshold": "90"}"#).unwrap();
+        let later: Value = serde_json::from_slice(&frame.json(&control)).unwrap();
+        assert_eq!((&later["settings"]["threshold"]["value"], &later["number"]), (&"90".into(), &7.into()));
+        assert_eq!(frame.json.get().unwrap().as_ptr(), kept);
     }
 }

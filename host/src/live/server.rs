@@ -7,8 +7,8 @@
 //! | `POST settings` | what is set then, as JSON; 400 with a sentence if it cannot be obeyed |
 //!
 //! Everything else is a status and a sentence. A client may be slow, silent or many: a connection has a time to live,
-//! those above a number are turned away, and a request is small. What a client is owed is one pair, which it shares
-//! with the others.
+//! those above a number are turned away, those above another are hung up on, and a request is small. What a client is
+//! owed is one pair.
 
 use std::convert::Infallible;
 use std::future::Future;
@@ -35,11 +35,13 @@ use super::slot::Slot;
 
 /// Connections at a time; a page has two or three.
 const MOST_CONNECTIONS: usize = 32;
+/// Further ones that are told so at a time.
+const MOST_FAREWELLS: usize = 32;
 /// How long a connection is used again.
 const LIFE: Duration = Duration::from_secs(60);
 /// And how long its last answer may take.
 const GRACE: Duration = Duration::from_secs(20);
-/// How long one that is turned away may take to hear so.
+/// How long one that is turned away may take to ask and to hear so.
 const FAREWELL: Duration = Duration::from_secs(2);
 /// How long a page is kept waiting for a pair: less than [`GRACE`].
 const HOLD: Duration = Duration::from_secs(10);
@@ -86,35 +88,35 @@ pub(super) fn prepare(
 }
 
 async fn accept(listener: TcpListener, site: Arc<Site>) {
-    let places = Arc::new(Semaphore::new(MOST_CONNECTIONS));
+    let [places, farewells] = [MOST_CONNECTIONS, MOST_FAREWELLS].map(|most| Arc::new(Semaphore::new(most)));
     loop {
         let Ok((stream, _)) = listener.accept().await else {
             sleep(AGAIN).await;
             continue;
         };
-        match Arc::clone(&places).try_acquire_owned() {
-            Ok(place) => {
-                let site = Arc::clone(&site);
-                tokio::spawn(async move {
-                    let answer = |request| {
-                        let site = Arc::clone(&site);
-                        async move { site.answer(request).await }
-                    };
-                    connection(stream, LIFE, answer).await;
-                    drop(place);
-                });
-            }
-            Err(_) => {
-                tokio::spawn(connection(stream, FAREWELL, |_| async { crowded() }));
-            }
+        if let Ok(place) = Arc::clone(&places).try_acquire_owned() {
+            let site = Arc::clone(&site);
+            tokio::spawn(async move {
+                let answer = |request| {
+                    let site = Arc::clone(&site);
+                    async move { site.answer(request).await }
+                };
+                connection(stream, (LIFE, GRACE), answer).await;
+                drop(place);
+            });
+        } else if let Ok(place) = Arc::clone(&farewells).try_acquire_owned() {
+            tokio::spawn(async move {
+                connection(stream, (FAREWELL, Duration::ZERO), |_| async { crowded() }).await;
+                drop(place);
+            });
         }
     }
 }
 
-/// Answers requests for so long, and then the one at hand.
+/// Answers requests for so long, and then the one at hand within its grace.
 async fn connection<F: Future<Output = Answer>>(
     stream: TcpStream,
-    life: Duration,
+    (life, grace): (Duration, Duration),
     answer: impl Fn(Request<Incoming>) -> F,
 ) {
     let mut builder = http1::Builder::new();
@@ -127,7 +129,7 @@ async fn connection<F: Future<Output = Answer>>(
     // How a connection ends is the client's affair.
     if timeout(life, connection.as_mut()).await.is_err() {
         connection.as_mut().graceful_shutdown();
-        let _ = timeout(GRACE, connection).await;
+        let _ = timeout(grace, connection).await;
     }
 }
 

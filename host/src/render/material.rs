@@ -47,7 +47,7 @@ pub struct Material {
 pub struct Texture {
     /// Their form.
     pub pattern: Pattern,
-    /// Their size, mm.
+    /// Their size, mm: positive, and no less than a millionth of how far the object reaches.
     pub size: f64,
     /// How much darker the darker ones are: 0 not at all, 1 black.
     pub contrast: f64,

@@ -172,9 +172,7 @@ impl Record {
             (eye.parts.histogram, eye.parts.level, eye.parts.tone) = (histogram.to_vec(), level, Some(tone));
         }
     }
-}
 
-impl Record {
     /// A copy without rasters.
     #[must_use]
     pub fn figures(&self) -> Self {

@@ -105,15 +105,17 @@ fn sort_by_distance<'o>(
     distance: &Plane<'_, u16>,
     mut scratch: Arena<'o>,
 ) -> Result<&'o mut [u32], CapacityError> {
-    let values = |(v, run): (usize, Range<usize>)| distance.row(v).get(run).unwrap_or_default();
+    let values = |(v, run): (usize, Range<usize>)| within(distance.row(v), run);
     let greatest = |values: &[u16]| values.iter().copied().fold(0, u16::max);
     let largest = object_runs(bitmap).map(values).map(greatest).max().unwrap_or(0);
     let set = bitmap.count();
     let order = scratch.take::<u32>(scratch_order(set, largest), "entries of the thinning order")?;
     let (list, next) = order.split_at_mut(set);
     next.fill(0);
-    for values in object_runs(bitmap).map(values) {
+    for (v, run) in object_runs(bitmap) {
+        let (all, values) = (run.len(), values((v, run)));
         values.iter().for_each(|d| next[usize::from(*d)] += 1);
+        next[0] += (all - values.len()) as u32;
     }
     let mut start = 0;
     for entry in next.iter_mut() {
@@ -139,6 +141,11 @@ fn sort_by_distance<'o>(
 fn object_runs<'b>(bitmap: &'b Bitmap<'_>) -> impl Iterator<Item = (usize, Range<usize>)> + 'b {
     let rows = 0..bitmap.size().height;
     rows.flat_map(|v| Runs::of(bitmap.row(v as i32)).map(move |run| (v, run)))
+}
+
+/// The part of a run that a row of distances has; what is beyond counts as 0.
+fn within(row: &[u16], run: Range<usize>) -> &[u16] {
+    row.get(run.start..run.end.min(row.len())).unwrap_or_default()
 }
 
 /// The distance in a column of a row; 0 outside.

@@ -54,6 +54,8 @@ pub(super) struct Session<'a> {
     /// What the first pair and the last one were made with.
     first: Settings,
     settings: Settings,
+    /// What the cameras said to the exposure that was set last.
+    answers: Vec<String>,
     workspace: Workspace,
     /// If they are wanted.
     timings: Option<Timings>,
@@ -124,6 +126,7 @@ impl<'a> Session<'a> {
             dials,
             first: settings,
             settings,
+            answers: Vec::new(),
             workspace: Workspace::default(),
             timings: args.timings.then(Timings::begin),
             recording,
@@ -191,13 +194,13 @@ impl<'a> Session<'a> {
         if let Some(recording) = &mut self.recording {
             recording.add(number, &views.images)?;
         }
-        let mut remarks = self.obey();
+        self.obey();
         let result = if self.args.only_record {
             Ok(Success { size: "recorded".into(), warnings: Vec::new() })
         } else if self.args.best {
             self.weigh(views.images, views.warnings.len())
         } else {
-            remarks.splice(0..0, views.warnings.iter().cloned());
+            let remarks = views.warnings.iter().chain(&self.answers).cloned().collect();
             let folder = self.args.out.as_ref().map(|out| out.join(&name));
             let beside = || Beside {
                 name: name.clone(),
@@ -228,14 +231,14 @@ impl<'a> Session<'a> {
         Ok(self.scene.apply(views, calibration)?)
     }
 
-    /// Does what was set on the page; returns what the cameras say to that.
-    fn obey(&mut self) -> Vec<String> {
-        let Some(view) = &self.view else { return Vec::new() };
+    /// Does what was set on the page.
+    fn obey(&mut self) {
+        let Some(view) = &self.view else { return };
         let (settings, _) = view.control().settings();
         let exposure = settings.exposure.filter(|_| settings.exposure != self.settings.exposure);
         self.settings = settings;
         view::obey(&settings, &mut self.options, &mut self.scene);
-        let Some(exposure) = exposure else { return Vec::new() };
+        let Some(exposure) = exposure else { return };
         let told = |dial: &mut Dial| match (exposure, dial.set(exposure)) {
             (_, Err(error)) => Some(format!("the camera refuses the exposure: {error}")),
             (Exposure::Fixed(asked), Ok(Some(took))) if took != i64::from(asked) => {
@@ -243,7 +246,7 @@ impl<'a> Session<'a> {
             }
             _ => None,
         };
-        self.dials.iter_mut().filter_map(told).collect()
+        self.answers = self.dials.iter_mut().filter_map(told).collect();
     }
 
     /// The model of a pair, in its folder if there is one, and on the page.

@@ -18,7 +18,8 @@ pub(super) fn check(root: &Command, config: &Config) -> Result<(), ConfigError> 
             let Some(&(first, arg)) = holders.first() else { return Err(unknown(command, entry)) };
             let takes = |arg: &Arg| arg.get_value_names().map(<[_]>::to_vec);
             if let Some((other, _)) = holders.iter().find(|(_, other)| takes(other) != takes(arg)) {
-                let (name, first, other) = (&entry.name, first.get_name(), other.get_name());
+                let table = |command| path_of(command).split(' ').skip(1).collect::<Vec<_>>().join(".");
+                let (name, first, other) = (&entry.name, table(first), table(other));
                 let what = format!(
                     "`{name}` is not the same for every command: put it into [{first}], [{other}] or the like"
                 );
@@ -56,11 +57,14 @@ fn unknown(command: &Command, entry: &Entry) -> ConfigError {
         let typed = [command.get_name().to_owned(), format!("--{}=0", entry.name)];
         suggested(command.clone().try_get_matches_from(typed).err().as_ref(), ContextKind::SuggestedArg)
     });
-    let path = Some(command.get_name())
-        .filter(|name| *name != "host")
-        .map_or("host".to_owned(), |name| format!("host {name}"));
+    let path = path_of(command);
     let hint = meant.unwrap_or_else(|| format!("names are those of the options in `{path} --help`"));
     ConfigError::at(&entry.place, format!("there is no option `{}`; {hint}", entry.name))
+}
+
+/// What is typed for a command of a root that was built.
+fn path_of(command: &Command) -> &str {
+    command.get_bin_name().unwrap_or_else(|| command.get_name())
 }
 
 fn check_value(arg: &Arg, entry: &Entry) -> Result<(), ConfigError> {

@@ -61,26 +61,34 @@ async function follow() {
   for (;;) {
     // Nobody looks: then nothing is made for us.
     while (document.hidden || byId("hold").checked) await later(200);
-    let answer, next;
-    let begun = 0;
+    let answer;
     try {
       answer = await fetch(home + "pair?after=" + last);
-      begun = performance.now();
-      if (answer.status === 200) next = await answer.json();
     } catch {
       state("ended", "the program has ended; start it again and open the address that it prints then");
       await later(1000);
       continue;
     }
-    if (next) {
+    const begun = performance.now();
+    let next;
+    try {
+      if (answer.status === 204) continue;
+      if (answer.status !== 200) {
+        state("ended", await answer.text());
+        await later(2000);
+        continue;
+      }
+      next = await answer.json();
+      // The pair before may have been held while this one was waited for.
+      if (byId("hold").checked) continue;
       put(next);
       await drawn();
       gauge(next, Number(answer.headers.get("ossature-age-ms")) + performance.now() - begun);
-      last = next.number;
-    } else if (answer.status !== 204) {
-      state("ended", await answer.text());
-      await later(2000);
+    } catch (error) {
+      state("refused", "this pair could not be drawn: " + error.message);
+      if (!next) await later(1000);
     }
+    if (next) last = next.number;
   }
 }
 

@@ -1,19 +1,18 @@
 //! The model from three sides beside the photograph, as in the paper's Figure 8.
 
 use super::canvas::{Anchor, Canvas, Letters};
-use super::panel::{FOOT, GAP, HEAD};
+use super::panel::{FOOT, GAP, HEAD, alone};
 use crate::mesh::Mesh;
 use crate::render::render_with;
-use crate::report::layers::Place;
-use crate::report::layers::colour::{ACCENT, APART, FAINT, GROUND, INK, OBJECT, PAPER, RIM, WHITE, mix};
-use crate::report::record::{Eye, Parts, Rasters};
-use crate::stage::balls::px2;
+use crate::report::layers::colour::{FAINT, INK, OBJECT, PAPER};
+use crate::report::layers::frame::Frame;
+use crate::report::layers::{self, Place, Seen};
+use crate::report::record::Eye;
 use crate::view::Pinhole;
 use image::imageops::FilterType;
-use image::{DynamicImage, GrayImage, Rgb, RgbImage};
+use image::{DynamicImage, GrayImage, RgbImage};
 use nalgebra::{Matrix3, Point3};
 use shared::bitmap::PixelBox;
-use shared::stage::graph::NodeKind;
 
 /// Side of a view, px.
 pub(super) const SIDE: u32 = 360;
@@ -45,11 +44,11 @@ pub(super) fn model(eye: &Eye, mesh: &Mesh, truth: Option<&Mesh>) -> Option<RgbI
         let below = Place::new(below.0.into(), below.1.into());
         canvas.text(name, below, Anchor::Centre, Letters::Small, FAINT);
     };
-    let Rasters { grey, mask, .. } = eye.rasters.as_ref()?;
+    let grey = &eye.rasters.as_ref()?.grey;
     let square = Square::around(&eye.parts.bounds?);
     put(&coloured(square.cut(grey)), "left image", 0, 0);
     if truth.is_some() {
-        put(&square.skeleton(mask, &eye.parts), "skeleton", 0, 1);
+        put(&square.skeleton(eye), "skeleton", 0, 1);
     }
     for (row, (what, mesh)) in (0..).zip([("model", Some(mesh)), ("truth", truth)]) {
         for (column, (name, turn)) in (1..).zip(VIEWS) {
@@ -67,7 +66,7 @@ fn coloured(picture: GrayImage) -> RgbImage {
 
 /// The square of an image that is shown, px.
 struct Square {
-    first: [i64; 2],
+    first: [i32; 2],
     side: u32,
 }
 
@@ -76,7 +75,7 @@ impl Square {
     fn around(bounds: &PixelBox) -> Self {
         let size = [bounds.max.u - bounds.min.u, bounds.max.v - bounds.min.v].map(|s| u32::from(s) + 1);
         let side = (f64::from(size[0].max(size[1])) / FILL).ceil() as u32;
-        let first = |low: u16, size: u32| i64::from(low) - i64::from((side - size) / 2);
+        let first = |low: u16, size: u32| i32::from(low) - ((side - size) / 2) as i32;
         Self { first: [first(bounds.min.u, size[0]), first(bounds.min.v, size[1])], side }
     }
 
@@ -84,32 +83,20 @@ impl Square {
     fn cut(&self, image: &GrayImage) -> GrayImage {
         let square = GrayImage::from_fn(self.side, self.side, |x, y| {
             let inside =
-                |from: i64, by: u32, limit: u32| (from + i64::from(by)).clamp(0, i64::from(limit) - 1) as u32;
+                |from: i32, by: u32, limit: u32| (from + by as i32).clamp(0, limit as i32 - 1) as u32;
             let [u, v] = self.first;
             *image.get_pixel(inside(u, x, image.width()), inside(v, y, image.height()))
         });
         image::imageops::resize(&square, SIDE, SIDE, FilterType::CatmullRom)
     }
 
-    /// The object's mask, and in it the branches of its pruned skeleton with their nodes.
-    fn skeleton(&self, mask: &GrayImage, parts: &Parts) -> RgbImage {
-        let mask = self.cut(mask);
-        let part = |x, y| f64::from(mask.get_pixel(x, y)[0]) / 255.0;
-        let mut canvas = Canvas::new(SIDE, SIDE, GROUND);
-        canvas.paste(&RgbImage::from_fn(SIDE, SIDE, |x, y| Rgb(mix(GROUND, OBJECT, part(x, y)))), (0, 0));
-        let scale = f64::from(SIDE) / f64::from(self.side);
-        let to = |x: f64, first: i64| (x - first as f64 + 0.5) * scale - 0.5;
-        let at = |u: f64, v: f64| Place::new(to(u, self.first[0]), to(v, self.first[1]));
-        for (k, (edge, pixels)) in parts.edges.iter().enumerate() {
-            let places: Vec<Place> = pixels.iter().map(|p| at(p.u.into(), p.v.into())).collect();
-            canvas.lines(&places, edge.closed, 2.0, APART[k % APART.len()]);
-        }
-        for node in parts.nodes.iter().filter(|node| node.kind != NodeKind::Loop) {
-            let colour = if node.kind == NodeKind::Junction { ACCENT } else { WHITE };
-            let place = px2(node.position);
-            canvas.dot(at(place.x, place.y), 3.0, colour, RIM);
-        }
-        canvas.finish()
+    /// The object's mask, and in it the branches of its pruned skeleton with their nodes, as large as a view.
+    fn skeleton(&self, eye: &Eye) -> RgbImage {
+        let seen = Seen { name: "left", parts: &eye.parts, rasters: eye.rasters.as_ref() };
+        let (mut canvas, panel) = alone(Frame { first: self.first, size: [self.side; 2] });
+        let mask = layers::eye::silhouette(&seen, OBJECT);
+        panel.draw(&mut canvas, mask.into_iter().chain([layers::eye::skeleton(&eye.parts)]));
+        image::imageops::resize(&canvas.finish(), SIDE, SIDE, FilterType::CatmullRom)
     }
 }
 

@@ -102,6 +102,12 @@ impl Panel {
     }
 }
 
+/// A panel by itself, on a canvas of its size.
+pub(super) fn alone(frame: Frame) -> (Canvas, Panel) {
+    let [width, height] = picture(&frame);
+    (Canvas::new(width, height, PAPER), Panel { frame, scale: scale(&frame), corner: (0, 0) })
+}
+
 /// A canvas with a title above and a panel a frame, side by side, each over its name.
 pub(super) fn sheet(title: &str, frames: &[(Frame, &str)]) -> (Canvas, Vec<Panel>) {
     staggered(title, frames, 0)

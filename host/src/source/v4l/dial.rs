@@ -10,7 +10,7 @@ use super::super::exposure::{Exposure, Range};
 
 /// The kernel's numbers of controls (`linux/v4l2-controls.h`).
 const AUTO: u32 = 0x009a_0901;
-/// Each control of a time, and what it can usefully be: up to 0.1 s, which is 10 pairs a second.
+/// Each control of a time, and the longest that is offered: 0.1 s, which is 10 pairs a second, or so many lines.
 const TIMES: [(u32, u32, &str); 2] = [(0x009a_0902, 1000, "× 0.1 ms"), (0x0098_0911, 10_000, "lines")];
 /// Modes of the automatic: the time by hand; by the camera, or all of it by the camera.
 const MANUAL: i64 = 1;

@@ -116,9 +116,7 @@ impl Kernel {
         self.period = self.device.params().ok().and_then(|params| seconds(params.interval));
         Ok(())
     }
-}
 
-impl Kernel {
     /// Its exposure, if it has controls for it. The node is opened once more, so that it can be set while pictures are
     /// taken.
     #[must_use]
