@@ -6,10 +6,11 @@ use arbitrary::Arbitrary;
 use fuzz::figure::{Figure, draw};
 use host::memory::Storage;
 use libfuzzer_sys::fuzz_target;
+use oracle::core::hangs_together;
 use oracle::wire::{Lists, check};
 use shared::bitmap::{Grey, Size, WORD_BITS};
 use shared::fixed::PX;
-use shared::pipeline::{self, Finding, Kernels, Memory, Outcome, Settings};
+use shared::pipeline::{self, Finding, Kernels, Memory, Settings};
 use shared::stage::binarise::{Polarity, Threshold};
 use shared::stage::correspond::PaperMatching;
 use shared::stage::depth::Optics;
@@ -135,24 +136,6 @@ fn moved(left: &[u8], width: usize, shift: usize, own: Option<&Figure>) -> Vec<u
         own.draw(width, &mut right);
     }
     right
-}
-
-fn hangs_together(memory: &Memory<'_>, outcome: &Outcome) {
-    assert!(outcome.areas.iter().all(|area| *area >= 1));
-    for eye in &memory.eyes {
-        let mut next = 0;
-        for l in eye.loops.iter() {
-            assert!(l.start == next && l.len >= 8);
-            next += l.len;
-        }
-        assert_eq!(next, eye.contour.len());
-        for branch in eye.branches.iter() {
-            assert!(branch.samples + branch.sample_count <= eye.samples.len());
-            assert!(branch.controls + branch.control_count <= eye.controls.len());
-        }
-    }
-    assert_eq!(memory.balls.len(), memory.depths.len());
-    assert!(memory.balls.iter().all(|ball| ball.rho > 0));
 }
 
 fn agree(one: &Memory<'_>, other: &Memory<'_>) {

@@ -2,11 +2,11 @@
 //! (the profile of these tests checks), its lists hang together, the same memory used again gives the
 //! same answer, and memory that is too short is a finding.
 
-use oracle::core::{Core, Picture, picture, size};
+use oracle::core::{Core, Picture, hangs_together, picture, size};
 use oracle::raster::Random;
 use shared::bitmap::WORD_BITS;
 use shared::fixed::PX;
-use shared::pipeline::{Finding, Memory, Outcome, Settings};
+use shared::pipeline::{Finding, Outcome, Settings};
 use shared::stage::binarise::{Polarity, Threshold};
 use shared::stage::correspond::PaperMatching;
 use shared::stage::depth::Optics;
@@ -69,26 +69,8 @@ fn pictures(random: &mut Random) -> [Picture; 2] {
     [left, right]
 }
 
-/// What must hold of the lists after every run that gives an outcome.
-fn check(memory: &Memory<'_>, _: &Outcome) {
-    for eye in &memory.eyes {
-        let mut next = 0;
-        for l in eye.loops.iter() {
-            assert!(l.start == next && l.len >= 8);
-            next += l.len;
-        }
-        assert_eq!(next, eye.contour.len());
-        for branch in eye.branches.iter() {
-            assert!(branch.samples + branch.sample_count <= eye.samples.len());
-            assert!(branch.controls + branch.control_count <= eye.controls.len());
-        }
-    }
-    assert_eq!(memory.balls.len(), memory.depths.len());
-    assert!(memory.balls.iter().all(|b| b.rho > 0));
-}
-
 fn answer(core: &mut Core, pair: &[Picture; 2], settings: &Settings) -> Result<Outcome, Finding> {
-    core.run([&pair[0], &pair[1]], settings, "", &mut (), check)
+    core.run([&pair[0], &pair[1]], settings, "", &mut (), hangs_together)
 }
 
 #[test]
@@ -148,7 +130,7 @@ fn memory_that_is_too_short_is_a_finding() {
                 0 => &["boundary pairs", "skeleton pairs"],
                 _ => &["matches", "balls", "depths"],
             };
-            let found = core.run([&pair[0], &pair[1]], settings, part, &mut (), check);
+            let found = core.run([&pair[0], &pair[1]], settings, part, &mut (), hangs_together);
             let refused = matches!(found, Err(Finding::Capacity(_)));
             assert_eq!(refused, !unused.contains(&part), "mode {mode} without {part}: {found:?}");
         }

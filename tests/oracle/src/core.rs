@@ -19,6 +19,28 @@ use shared::stage::sequential_thinning::scratch_order;
 /// `picture[v][u]`: a grey value.
 pub type Picture = Vec<Vec<u8>>;
 
+/// What must hold of the lists after every run that gives an outcome.
+///
+/// # Panics
+/// When it does not.
+pub fn hangs_together(memory: &Memory<'_>, outcome: &Outcome) {
+    assert!(outcome.areas.iter().all(|area| *area >= 1));
+    for eye in &memory.eyes {
+        let mut next = 0;
+        for l in eye.loops.iter() {
+            assert!(l.start == next && l.len >= 8);
+            next += l.len;
+        }
+        assert_eq!(next, eye.contour.len());
+        for branch in eye.branches.iter() {
+            assert!(branch.samples + branch.sample_count <= eye.samples.len());
+            assert!(branch.controls + branch.control_count <= eye.controls.len());
+        }
+    }
+    assert_eq!(memory.balls.len(), memory.depths.len());
+    assert!(memory.balls.iter().all(|ball| ball.rho > 0));
+}
+
 /// The parts of one eye's memory, then those that both eyes share.
 pub const PARTS: [&str; 17] = [
     "mask",
