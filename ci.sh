@@ -17,26 +17,33 @@ CASES=../shared/eval
 
 passed=0
 failed=0
+# What failed, said again at the end: the log above is long.
+broken=()
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
+
+fail() {
+    echo "FAILED: $1"
+    failed=$((failed + 1))
+    broken+=("$1")
+}
 
 # Run a command as one check.
 check() {
     echo "+ $*"
-    if "$@"; then passed=$((passed + 1)); else failed=$((failed + 1)); echo "FAILED: $*"; fi
+    if "$@"; then passed=$((passed + 1)); else fail "$*"; fi
 }
 
 # Run a command that prints cargo's "test result:" lines, and count its tests.
 tests() {
     echo "+ $*"
     "$@" 2>&1 | tee "$log"
-    local status=$? ok bad
+    local status=$? before=$failed ok name
     ok=$(awk '/^test result:/ { n += $4 } END { print n + 0 }' "$log")
-    bad=$(awk '/^test result:/ { n += $6 } END { print n + 0 }' "$log")
-    if [ "$status" -ne 0 ] && [ "$bad" -eq 0 ]; then bad=1; fi
-    if [ "$ok" -eq 0 ] && [ "$bad" -eq 0 ]; then echo "FAILED: no test ran"; bad=1; fi
     passed=$((passed + ok))
-    failed=$((failed + bad))
+    while read -r name; do fail "$name"; done < <(awk '/^test .* \.\.\. FAILED$/ { print $2 }' "$log")
+    if [ "$status" -ne 0 ] && [ "$failed" -eq "$before" ]; then fail "$*"; fi
+    if [ "$ok" -eq 0 ] && [ "$failed" -eq "$before" ]; then fail "no test ran: $*"; fi
 }
 
 # apt-get, as whoever may.
@@ -85,7 +92,7 @@ ruler() {
     fi
     if ! can_measure "$venv/bin/python"; then
         echo "SKIPPED: the ruler's Python packages could not be installed: NO case with known truth is run"
-        [ "${CI:-}" != true ] || { echo "FAILED: in CI these cases must run"; failed=$((failed + 1)); }
+        [ "${CI:-}" != true ] || fail "in CI the cases with known truth must run"
         return
     fi
     export OSSATURE_RULER=$PWD/$venv/bin/python
@@ -211,8 +218,9 @@ for part in "${parts[@]}"; do
     echo "== $part"
     start=$SECONDS before=$((passed + failed))
     "part_$part"
-    [ $((passed + failed)) -gt "$before" ] || failed=$((failed + 1))
+    [ $((passed + failed)) -gt "$before" ] || fail "$part did nothing"
     echo "== $part: $((SECONDS - start)) s"
 done
+for name in "${broken[@]}"; do echo "FAILED: $name"; done
 echo "$passed passed, $failed failed"
 [ "$failed" -eq 0 ]
