@@ -104,7 +104,7 @@ fn switches(browser: &mut Browser, page: &Page) -> Vec<String> {
     names.as_array().unwrap().iter().map(|name| name.as_str().unwrap().to_owned()).collect()
 }
 
-/// Every switch, used, changes the picture of its part; used again, it gives the first picture back.
+/// Every switch, used, changes the picture of its part; all used again give the first picture back.
 fn use_switches(browser: &mut Browser, page: &Page, report: &Report) {
     let names = switches(browser, page);
     for name in report.switches {
@@ -113,6 +113,7 @@ fn use_switches(browser: &mut Browser, page: &Page, report: &Report) {
     for (part, shown, hidden, scale) in
         [("traces", "#space", "views-part", SCALE), ("layers", "#views", "space-part", 2.0)]
     {
+        // From the lowest up: none is hidden by what was switched before it.
         let own = format!("[...document.querySelectorAll('#{part} input')].map((box) => box.name)");
         let own = browser.evaluate(page, &own);
         let own: Vec<_> = own.as_array().unwrap().iter().filter_map(|name| name.as_str()).collect();
@@ -121,17 +122,20 @@ fn use_switches(browser: &mut Browser, page: &Page, report: &Report) {
         }
         // What is not looked at need not be drawn.
         let hide = |how: &str| format!("document.getElementById('{hidden}').style.visibility = '{how}'");
+        let click = |name: &str| format!("document.querySelector('#{part} [name={name}]').click()");
         browser.evaluate(page, &hide("hidden"));
         let first = browser.picture(page, shown, scale);
+        let mut before = first.clone();
         for name in &own {
-            let click = format!("document.querySelector('#{part} [name={name}]').click()");
-            browser.evaluate(page, &click);
+            browser.evaluate(page, &click(name));
             browser.settle(page);
-            let other = browser.picture(page, shown, scale);
-            let changed = changed(&first, &other);
+            let after = browser.picture(page, shown, scale);
+            let changed = changed(&before, &after);
             assert!(changed >= SEEN, "{}: {name} changes {changed} pixels", report.name);
-            browser.evaluate(page, &click);
+            before = after;
         }
+        let all = own.iter().map(|name| click(name)).collect::<Vec<_>>().join(";");
+        browser.evaluate(page, &all);
         browser.settle(page);
         let again = browser.picture(page, shown, scale);
         let changed = changed(&first, &again);

@@ -6,12 +6,10 @@
 //! that has the option. Switches are true or false; an option that may be given twice takes a list. A relative path
 //! starts at the folder of the file:
 //!
-//!     polarity = "dark"
-//!     calib = "rig/calib.yaml"
-//!
-//!     [capture]
-//!     device = ["/dev/video0", "/dev/video2"]
-//!     no-pictures = true
+//!   polarity = "dark"
+//!   calib = "rig/calib.yaml"
+//!   capture.device = ["/dev/video0", "/dev/video2"]
+//!   capture.no-pictures = true
 //!
 //! The default is below the file, its common part below the command's table, and the file below the command line.
 //! What is typed puts aside what the file says of it, and whatever contradicts it. A switch that the file turns on is

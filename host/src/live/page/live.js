@@ -21,13 +21,14 @@ function state(kind, words) {
 
 function put(next) {
   content = next.content;
+  // Before anything is drawn: until now the page was hidden below this.
+  if (content.reached === null) state("going", "live");
+  else state("refused", "refused: " + content.gates[0].sentence);
   show(content);
   if (!last && location.hash) onhashchange();
   byId("gates").prepend(...next.remarks.map((remark) => element("li", { className: "warning" }, remark)));
   putPictures(next.pictures);
   tellSettings(next.settings);
-  if (content.reached === null) state("going", "live");
-  else state("refused", "refused: " + content.gates[0].sentence);
 }
 
 function putPictures(pictures) {
