@@ -75,6 +75,7 @@ struct Setting {
     /// In words, where a default is no value.
     note: Option<String>,
     is_switch: bool,
+    is_list: bool,
     origin: Origin,
 }
 
@@ -146,6 +147,7 @@ fn setting(arg: &Arg, matches: &ArgMatches, line: &Line) -> Setting {
         values: values.map(|value| value.to_string_lossy().into_owned()).collect(),
         note: default_in_words(arg),
         is_switch: line::is_switch(arg),
+        is_list: line::is_list(arg),
         origin,
     }
 }
@@ -184,7 +186,7 @@ fn as_json(file: Option<&Path>, told: &[(String, Vec<Setting>)]) -> Value {
         let value = match setting.values.as_slice() {
             [] => Value::Null,
             [one] if setting.is_switch => (one == "true").into(),
-            [one] => one.as_str().into(),
+            [one] if !setting.is_list => one.as_str().into(),
             all => all.into(),
         };
         match &setting.origin {

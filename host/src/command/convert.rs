@@ -25,7 +25,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use serde_json::json;
 
-use super::table::Table;
+use super::table::{Table, count};
 use super::{Failure, say, say_json};
 use crate::curves::spline::Spline;
 use crate::export;
@@ -76,10 +76,15 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         }));
     }
     let mut table = Table::new(&args.output.display().to_string());
-    let elements = if many == 1 { elements.trim_end_matches('s') } else { elements };
-    table.row(kind, &format!("{number} {}, {many} {elements}", points.replace('_', " ")));
+    table.row(kind, &format!("{}, {}", counted(number, points), counted(many, elements)));
     table.row("from", &input.display().to_string());
     say(table.text())
+}
+
+/// So many of what JSON calls by this name.
+fn counted(number: usize, name: &str) -> String {
+    let one = if name == "vertices" { "vertex" } else { name.trim_end_matches('s') };
+    count(number, one, name).replace('_', " ")
 }
 
 /// The file of a folder of results that the output is made of.

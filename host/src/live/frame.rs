@@ -3,21 +3,18 @@
 //! * **In**: what was made of a pair, or why it was refused, with everything that the core showed. **Out**: JSON,
 //!   made when the first page asks for it and kept for the others; what is set goes with each answer, as it is then.
 
-use std::io::Cursor;
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
-use base64::Engine as _;
-use base64::engine::general_purpose::STANDARD;
 use hyper::body::Bytes;
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{GrayImage, ImageEncoder};
+use image::GrayImage;
 use serde::Serialize;
 
 use super::control::Control;
 use crate::calibration::StereoCamera;
 use crate::reconstruct::{Options, Reconstruction, Refusal};
 use crate::report::page::Content;
+use crate::report::page::picture::address;
 use crate::report::record::Record;
 use crate::report::{Refused, Run, numbers};
 
@@ -122,19 +119,12 @@ impl Frame {
     }
 }
 
-/// A picture as an address that holds it.
-fn address(image: &GrayImage) -> String {
-    let mut bytes = Cursor::new(Vec::new());
-    let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Up);
-    // Writing to memory does not fail; were it to, there would be no picture.
-    let _ = encoder.write_image(image, image.width(), image.height(), image::ExtendedColorType::L8);
-    format!("data:image/png;base64,{}", STANDARD.encode(bytes.get_ref()))
-}
-
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
     use crate::live::control::{Limits, Settings};
+    use base64::Engine as _;
+    use base64::engine::general_purpose::STANDARD;
     use serde_json::Value;
 
     /// A pair that was refused before anything was seen of it.

@@ -8,6 +8,7 @@
 //! Plotly, which the crate `plotly` carries, draws what turns and what is plotted
 //! (`docs/decisions/0017-report-page.md`); the views are SVG.
 
+pub(crate) mod picture;
 mod space;
 mod views;
 

@@ -1,13 +1,11 @@
 //! Both views for the script: a layer a stage, each as SVG in pixels of the image.
 
 use super::escaped;
+use super::picture::address;
 use crate::report::layers::colour::{Colour, RIM};
 use crate::report::layers::frame::Frame;
 use crate::report::layers::pair::Pair;
 use crate::report::layers::{Layer, Mark, Place, eye};
-use base64::Engine as _;
-use base64::engine::general_purpose::STANDARD;
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{Rgba, RgbaImage};
 use serde::Serialize;
 use shared::stage::distance::DISTANCE_PX;
@@ -131,17 +129,11 @@ fn picture(frame: Frame, colour: &dyn Fn(u32, u32) -> Option<Colour>) -> String 
     if image.pixels().all(|pixel| pixel.0[3] == 0) {
         return String::new();
     }
-    let mut bytes = Vec::new();
-    let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive);
-    // Writing to a vector does not fail; were it to, the layer would be missing.
-    if image.write_with_encoder(encoder).is_err() {
-        return String::new();
-    }
     let [x, y] = frame.first.map(|first| f64::from(first) - 0.5);
     format!(
         "<image x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" \
-         href=\"data:image/png;base64,{}\"/>",
-        STANDARD.encode(bytes)
+         href=\"{}\"/>",
+        address(&image)
     )
 }
 
