@@ -156,8 +156,14 @@ fn model_is_drawn(browser: &mut Browser, page: &Page, name: &str) {
     assert!(covered >= 5 && shades.len() >= 8, "{name}: {covered} % in {} shades", shades.len());
 }
 
-/// Nothing is wider than the window.
+/// Plots have taken the size of their places, and nothing is wider than the window.
 fn fits(browser: &mut Browser, page: &Page, name: &str) {
+    let sized = "[...document.querySelectorAll('.plot')].every((plot) => !plot._fullLayout || !plot.clientWidth || \
+                 Math.abs(plot._fullLayout.width - plot.clientWidth) < 1)";
+    let wait =
+        "new Promise((done) => { const look = () => SIZED ? done(0) : setTimeout(look, 50); look(); })";
+    browser.evaluate(page, &wait.replace("SIZED", sized));
+    browser.settle(page);
     let beyond = browser.evaluate(page, "document.documentElement.scrollWidth - innerWidth");
     assert!(beyond.as_f64().unwrap() <= 0.0, "{name}: {beyond} px beyond the window");
 }
@@ -172,9 +178,8 @@ fn look(browser: &mut Browser, report: &Report) {
     }
     for (name, sight) in [("night", NIGHT), ("phone", PHONE)] {
         browser.see(&page, sight);
-        browser.settle(&page);
-        keep(browser, &page, &format!("{}-{name}", report.name));
         fits(browser, &page, &report.name);
+        keep(browser, &page, &format!("{}-{name}", report.name));
     }
     assert_eq!(browser.complaints(), Vec::<String>::new(), "{}", report.name);
     assert_eq!(browser.requests(), [address], "{}", report.name);

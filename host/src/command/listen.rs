@@ -23,48 +23,42 @@
 //!   host listen --calib calib.yaml --view
 //!   host listen --port unix:/tmp/camera --calib calib.yaml --record cup.link --json
 
+mod desk;
+mod orders;
+mod recording;
+
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use clap::builder::ArgPredicate;
-use indicatif::ProgressBar;
-use serde_json::{Value, json};
 use shared::camera::PairModel;
 use shared::stage::binarise::{Polarity, Threshold};
-use shared::wire::{self, Decoder, ExposureSetting, MAX_FRAME, ToDevice};
+use shared::wire::ToDevice;
 
-use super::connect::{
-    PortArgs, check_calibration, hello_as_json, link_as_json, link_in_words, model_of, progress, version,
-};
-use super::model::{self, Model, NoModel, Place};
+use super::connect::{PortArgs, model_of};
 use super::options::GrowArgs;
-use super::table::{count, sides};
-use super::timings::Timings;
-use super::view::{self, Beside, Pace, ViewArgs};
-use super::{Failure, interruption, note, say, words_of};
-use crate::live::View;
+use super::view::ViewArgs;
+use super::{Failure, interruption, words_of};
 use crate::live::control::{Limits, Settings};
-use crate::reconstruct::{Options, Workspace};
-use crate::report::record::Record;
+use crate::reconstruct::Options;
 use crate::report::words::{parse_polarity, parse_threshold};
-use crate::source::exposure::{Exposure, Range};
-use crate::source::serial::inbox::{Hello, Inbox, Message, Pair};
-use crate::source::serial::link::frames;
-use crate::source::serial::recording::{Recording, Writer};
-use crate::source::serial::session::{Session, SessionError, Tally};
+use crate::source::exposure::Range;
+use crate::source::serial::inbox::Message;
+use crate::source::serial::recording::Writer;
+use crate::source::serial::session::Session;
+use desk::Desk;
+pub(super) use desk::Wanted;
+use orders::Orders;
+pub(super) use recording::replay;
 
 /// Longest that is waited for a frame before time is looked at.
 const LOOK: Duration = Duration::from_millis(250);
 
 /// Lines that a device's sensors can expose.
 const LINES: Range = Range { least: 1, most: 670, unit: "lines", auto: true };
-/// What a device can be told of how it looks.
-const ORDERS: [&str; 3] = ["threshold", "polarity", "exposure"];
-/// What a line of a sensor is amplified by before a pair has come that says so, 1/256.
-const GAIN: u16 = 256;
 
 /// Arguments of `listen`.
 #[derive(Debug, clap::Args)]
@@ -202,358 +196,4 @@ fn listen(
 fn limits() -> Limits {
     let region = Err("a device looks at all of its pictures");
     Limits { threshold: Ok(()), polarity: Ok(()), region, exposure: Ok(LINES) }
-}
-
-/// What the device is to be told: nothing that nobody has said.
-struct Orders {
-    /// For a device that begins, one of each of [`ORDERS`]: what was asked for at first, and what it obeyed since.
-    kept: [Option<ToDevice>; ORDERS.len()],
-    /// What of the page the device was told.
-    settings: Settings,
-}
-
-impl Orders {
-    /// What the flags say, and with a page all that it shows as set.
-    fn new(args: &Args, settings: Settings) -> Self {
-        let shown = args.view.is_wanted();
-        let threshold = args.threshold.or_else(|| shown.then_some(settings.threshold));
-        let polarity = args.polarity.or_else(|| shown.then_some(settings.polarity));
-        Self { kept: [threshold.map(ToDevice::Threshold), polarity.map(ToDevice::Polarity), None], settings }
-    }
-
-    /// Has a device that was greeted begin.
-    fn start(&self, session: &mut Session, desk: &mut Desk<'_>) -> Result<(), SessionError> {
-        for (which, order) in self.kept.iter().enumerate() {
-            if let Some(order) = order {
-                desk.give(session, which, order)?;
-            }
-        }
-        session.order_cameras(&ToDevice::Start)
-    }
-
-    /// Passes on what was changed on the page.
-    fn follow(&mut self, session: &mut Session, desk: &mut Desk<'_>) -> Result<(), SessionError> {
-        let Some(view) = &desk.view else { return Ok(()) };
-        let ((settings, _), before) = (view.control().settings(), self.settings);
-        let exposure = settings.exposure.filter(|_| settings.exposure != before.exposure);
-        let exposure = exposure.map(|exposure| match exposure {
-            Exposure::Auto => ExposureSetting::Auto,
-            Exposure::Fixed(lines) => ExposureSetting::Fixed(desk.gains.map(|gain| {
-                let lines = u16::try_from(lines).unwrap_or(u16::MAX);
-                wire::Exposure { lines, gain }
-            })),
-        });
-        let changed = [
-            (settings.threshold != before.threshold).then_some(ToDevice::Threshold(settings.threshold)),
-            (settings.polarity != before.polarity).then_some(ToDevice::Polarity(settings.polarity)),
-            exposure.map(ToDevice::Exposure),
-        ];
-        for (which, order) in changed.into_iter().enumerate() {
-            if let Some(order) = order
-                && desk.give(session, which, &order)?
-            {
-                self.kept[which] = Some(order);
-            }
-        }
-        // Not before: what a device did not hear, because it was lost, it is told when it is back.
-        self.settings = settings;
-        Ok(())
-    }
-}
-
-/// What is wanted beside the models.
-#[derive(Clone, Copy)]
-pub(super) struct Wanted {
-    /// A page about each.
-    pub(super) page: bool,
-    /// JSON in place of text.
-    pub(super) json: bool,
-    /// How long each stage took.
-    pub(super) timings: bool,
-}
-
-/// Makes the models of a recording again, on a live page at a rate if there is one.
-///
-/// # Errors
-///
-/// If the recording cannot be read, or no pair gives a model.
-pub(super) fn replay(
-    path: &Path,
-    options: &Options,
-    place: (Option<&Path>, Wanted),
-    view: Option<(View, Option<f64>)>,
-) -> Result<(), Failure> {
-    let recording = Recording::read(path)?;
-    let (view, rate) = view.map_or((None, None), |(view, rate)| (Some(view), rate));
-    let stop = if view.is_some() { interruption()? } else { Arc::default() };
-    let mut pace = Pace::new(rate);
-    let mut desk = Desk::new((&recording.calibration, options), place, view);
-    let (mut inbox, mut tally) = (Inbox::new()?, Tally::default());
-    for (k, bytes) in recording.connections.iter().enumerate() {
-        let mut buffer = vec![0; MAX_FRAME];
-        let mut decoder = Decoder::new(&mut buffer);
-        let mut arrived = Vec::new();
-        frames(&mut decoder, bytes, |frame| arrived.push(frame));
-        let mut greeted = false;
-        for frame in arrived {
-            match inbox.read(&frame.frame()) {
-                // What a device said before it was greeted is of another time.
-                Ok(Message::Hello(hello)) if !greeted => {
-                    greeted = true;
-                    desk.greeted(&hello)?;
-                }
-                Ok(message) if greeted && !stop.load(Ordering::Relaxed) => {
-                    if matches!(message, Message::Pair(_)) {
-                        pace.wait(&stop);
-                    }
-                    desk.take(&mut inbox, message, 0)?;
-                }
-                Ok(_) => {}
-                Err(_) => tally.unreadable = tally.unreadable.saturating_add(1),
-            }
-        }
-        tally.add(decoder.counters());
-        tally.reconnections = u32::try_from(k).unwrap_or(u32::MAX);
-    }
-    desk.hold(&stop);
-    desk.close(&tally)
-}
-
-/// Where messages become models and words.
-struct Desk<'a> {
-    model: &'a PairModel,
-    options: &'a Options,
-    /// None if models are only looked at.
-    out: Option<&'a Path>,
-    page: bool,
-    json: bool,
-    /// The live page, if it is wanted.
-    view: Option<View>,
-    /// Of both eyes in the last pair, 1/256.
-    gains: [u16; 2],
-    /// What the device refused of what was set last: one of each of [`ORDERS`].
-    refusals: [Option<String>; ORDERS.len()],
-    /// If they are wanted.
-    timings: Option<Timings>,
-    workspace: Workspace,
-    bar: ProgressBar,
-    start: Instant,
-    pairs: u32,
-    models: u32,
-}
-
-impl<'a> Desk<'a> {
-    fn new(
-        (model, options): (&'a PairModel, &'a Options),
-        (out, wanted): (Option<&'a Path>, Wanted),
-        view: Option<View>,
-    ) -> Self {
-        let Wanted { page, json, timings } = wanted;
-        Self {
-            model,
-            options,
-            out,
-            page,
-            json,
-            view,
-            gains: [GAIN; 2],
-            refusals: Default::default(),
-            timings: timings.then(Timings::begin),
-            workspace: Workspace::default(),
-            bar: progress(),
-            start: Instant::now(),
-            pairs: 0,
-            models: 0,
-        }
-    }
-
-    /// Keeps the last pair on the page until the end.
-    fn hold(&self, stop: &AtomicBool) {
-        let Some(view) = &self.view else { return };
-        if self.pairs == 0 {
-            return;
-        }
-        if !stop.load(Ordering::Relaxed) {
-            self.remark("that was the last pair, which stays on the page until Ctrl-C");
-        }
-        let (_, mut version) = view.control().settings();
-        while view::wait(view, version, stop) {
-            version = view.control().settings().1;
-        }
-    }
-
-    /// Gives the device one of [`ORDERS`]; returns whether it obeys. With a page, a refusal is told and goes on.
-    fn give(&mut self, session: &mut Session, which: usize, order: &ToDevice) -> Result<bool, SessionError> {
-        let refusal = match session.order(order) {
-            Ok(()) => None,
-            Err(error @ SessionError::Refused(_)) if self.view.is_some() => {
-                Some(format!("{}: {}", ORDERS[which], words_of(&error)))
-            }
-            Err(error) => return Err(error),
-        };
-        if let Some(words) = &refusal
-            && refusal != self.refusals[which]
-        {
-            self.remark(words);
-        }
-        let obeys = refusal.is_none();
-        self.refusals[which] = refusal;
-        Ok(obeys)
-    }
-
-    /// A line to standard error.
-    fn remark(&self, line: &str) {
-        self.bar.suspend(|| note(line));
-    }
-
-    /// A line to standard output.
-    fn line(&self, json: impl FnOnce() -> Value, text: impl FnOnce() -> String) -> Result<(), Failure> {
-        let line = if self.json { json().to_string() } else { text() };
-        self.bar.suspend(|| say(&format!("{line}\n")))
-    }
-
-    fn greeted(&mut self, hello: &Hello) -> Result<(), Failure> {
-        check_calibration(self.model, hello)?;
-        self.line(
-            || json!({ "device": hello_as_json(hello) }),
-            || {
-                format!(
-                    "{}, firmware {}, {}x{} px",
-                    hello.board,
-                    version(hello),
-                    hello.picture[0],
-                    hello.picture[1]
-                )
-            },
-        )
-    }
-
-    /// One message; so many before it were lost.
-    fn take(&mut self, inbox: &mut Inbox, message: Message, lost: u32) -> Result<(), Failure> {
-        let Message::Pair(pair) = message else { return Ok(()) };
-        self.pairs += 1;
-        let name = format!("{:06}", self.pairs);
-        let folder = self.out.map(|out| out.join(&name));
-        let told = heading(&pair);
-        self.gains = pair.exposures.map(|exposure| exposure.gain);
-        match self.make((inbox, *pair), (name, folder.as_deref()), lost) {
-            Ok(model) => {
-                self.models += 1;
-                if let Some(timings) = &mut self.timings {
-                    timings.add(None, &model);
-                }
-                let warnings = &model.warnings;
-                self.line(
-                    || {
-                        let (mut told, more) = (
-                            told.clone(),
-                            json!({
-                                "folder": folder.as_ref().map(|folder| folder.display().to_string()),
-                                "warnings": warnings,
-                                "report": model.report,
-                            }),
-                        );
-                        merge(&mut told, more);
-                        told
-                    },
-                    || described(&told, &model, warnings, folder.as_deref()),
-                )
-            }
-            Err(failure) if failure.is::<NoModel>() => {
-                let sentence = words_of(&*failure);
-                self.line(
-                    || {
-                        let mut told = told.clone();
-                        merge(&mut told, json!({ "error": sentence }));
-                        told
-                    },
-                    || format!("pair {}: refused: {sentence}", told["pair"]),
-                )
-            }
-            Err(failure) => Err(failure),
-        }
-    }
-
-    /// The model of a pair, in its folder if there is one, and on the page if there is one.
-    fn make(
-        &mut self,
-        pair: (&mut Inbox, Pair),
-        (name, folder): (String, Option<&Path>),
-        lost: u32,
-    ) -> Result<Model, Failure> {
-        let arrived = Instant::now();
-        let mut record = Record::figures_only();
-        let place = Place { folder, report: self.json, page: self.page };
-        let made = model::receive(pair, (self.model, self.options), place, &mut record, &mut self.workspace);
-        let Some(view) = &mut self.view else {
-            let (model, made) = made?;
-            self.workspace.recycle(made);
-            return Ok(model);
-        };
-        let remarks = self.refusals.iter().flatten().cloned().collect();
-        let beside = Beside { name, pictures: None, remarks, dropped: lost.into(), arrived };
-        let choices = (self.model.into(), *self.options);
-        view::show((made, record), choices, beside, view, &mut self.workspace)
-    }
-
-    /// How it goes, on a terminal.
-    fn show(&self, tally: &Tally) {
-        let rate = f64::from(self.pairs) / self.start.elapsed().as_secs_f64().max(1e-3);
-        let link = link_in_words(tally).map_or_else(String::new, |words| format!("; {words}"));
-        let (models, pairs) = (self.models, self.pairs);
-        self.bar.set_message(format!("{models} models of {pairs} pairs, {rate:.2} a second{link}"));
-    }
-
-    fn close(self, tally: &Tally) -> Result<(), Failure> {
-        self.bar.finish_and_clear();
-        if let Some(timings) = &self.timings {
-            timings.tell();
-        }
-        let (models, pairs) = (self.models, self.pairs);
-        self.line(
-            || json!({ "pairs": pairs, "models": models, "link": link_as_json(tally) }),
-            || {
-                let link = link_in_words(tally).map_or_else(String::new, |words| format!("; {words}"));
-                format!("{models} of {} have a model{link}", count(pairs as usize, "pair", "pairs"))
-            },
-        )?;
-        match (pairs, models) {
-            (0, _) => Err("no pair came; look at the device's cameras (`host device info`)".into()),
-            (_, 0) => Err("no pair gave a model".into()),
-            _ => Ok(()),
-        }
-    }
-}
-
-/// What a device says of a pair beside its shape.
-fn heading(pair: &Pair) -> Value {
-    let exposure = |k: usize| {
-        let exposure = pair.exposures[k];
-        json!({ "lines": exposure.lines, "gain": f64::from(exposure.gain) / 256.0 })
-    };
-    json!({
-        "pair": pair.number,
-        "stamps_us": pair.stamps,
-        "gap_us": pair.stamps[1].wrapping_sub(pair.stamps[0]).cast_signed(),
-        "levels_grey": pair.levels,
-        "exposures": [exposure(0), exposure(1)],
-    })
-}
-
-/// Adds the fields of one object to another.
-fn merge(into: &mut Value, from: Value) {
-    if let (Some(into), Value::Object(from)) = (into.as_object_mut(), from) {
-        into.extend(from);
-    }
-}
-
-fn described(told: &Value, model: &Model, warnings: &[String], folder: Option<&Path>) -> String {
-    let mut text = format!("pair {}: {}", told["pair"], sides(model.size));
-    if let Some(folder) = folder {
-        text.push_str(&format!(": {}", folder.display()));
-    }
-    for warning in warnings {
-        text.push_str(&format!("\n  warning: {warning}"));
-    }
-    text
 }

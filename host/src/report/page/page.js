@@ -4,7 +4,7 @@
 
 const byId = (id) => document.getElementById(id);
 const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-const config = { responsive: true, displayModeBar: false };
+const config = { displayModeBar: false };
 
 function element(name, properties, ...children) {
   const made = Object.assign(document.createElement(name), properties);
@@ -79,11 +79,15 @@ function traces({ model, truth, skeleton, boundary }) {
 
 // From where the model is looked at; the left camera looks along z, and y runs down.
 // Where the part is high and narrow it is from farther away.
-const far = () => 1.9 * Math.max(1, (1.15 * byId("space").clientHeight) / byId("space").clientWidth);
+const far = ({ clientWidth, clientHeight }) => 1.9 * Math.max(1, (1.15 * clientHeight) / clientWidth);
+const length = ({ x, y, z }) => Math.hypot(x, y, z);
 const camera = (x, y, z) => {
-  const scale = far() / Math.hypot(x, y, z);
+  const scale = far(byId("space")) / length({ x, y, z });
   return { up: { x: 0, y: -1, z: 0 }, center: { x: 0, y: 0, z: 0 }, eye: { x: x * scale, y: y * scale, z: z * scale } };
 };
+
+// From where it is looked at now, if it is.
+const eyes = () => structuredClone(byId("space")._fullLayout?.scene?.camera);
 
 function drawSpace({ space }) {
   byId("space-part").hidden = !space;
@@ -97,18 +101,18 @@ function drawSpace({ space }) {
   for (const { name, trace } of all) if (name === "model" || name === "error") trace.opacity = opacity;
   const axis = (text) => ({ title: { text }, gridcolor: style("--line"), zeroline: false, color: style("--faint"), showbackground: false });
   const layout = {
-    scene: { aspectmode: "data", xaxis: axis("x, mm"), yaxis: axis("y, mm"), zaxis: axis("z, mm"), camera: camera(-0.45, -0.4, -1) },
+    scene: { aspectmode: "data", xaxis: axis("x, mm"), yaxis: axis("y, mm"), zaxis: axis("z, mm"), camera: eyes() ?? camera(-0.45, -0.4, -1) },
     margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: false, paper_bgcolor: "rgba(0,0,0,0)",
-    font: { color: style("--ink") }, uirevision: "kept",
+    font: { color: style("--ink") },
   };
   Plotly.react("space", all.map(({ name, trace }) => ({ name, ...trace, visible: on.has(name) })), layout, config);
 }
 
 // The model turned by keys, and put upright by buttons.
 function turn(key) {
-  const { eye } = byId("space")._fullLayout.scene.camera;
-  const distance = Math.hypot(eye.x, eye.y, eye.z);
-  let [round, up, scale] = [Math.atan2(eye.x, -eye.z), Math.asin(-eye.y / distance), distance / far()];
+  const { eye } = eyes();
+  const distance = length(eye);
+  let [round, up, scale] = [Math.atan2(eye.x, -eye.z), Math.asin(-eye.y / distance), distance / far(byId("space"))];
   const step = Math.PI / 18;
   if (key === "ArrowLeft") round += step;
   else if (key === "ArrowRight") round -= step;
@@ -126,6 +130,21 @@ byId("space").addEventListener("keydown", (event) => { if (turn(event.key)) even
 byId("turns").addEventListener("click", ({ target }) => {
   if (target.dataset.eye) Plotly.relayout("space", { "scene.camera": camera(...target.dataset.eye.split(",").map(Number)) });
 });
+
+// Plots are as large as their places, whatever changes these; the model is as large in its place as it was.
+const places = new ResizeObserver((entries) => entries.forEach(({ target }) => fit(target)));
+async function fit(plot) {
+  if (!plot._fullLayout || !plot.clientWidth) return;
+  const { width, height, scene } = plot._fullLayout;
+  const near = scene && length(scene.camera.eye) / far({ clientWidth: width, clientHeight: height });
+  await Plotly.Plots.resize(plot);
+  if (!scene) return;
+  const at = eyes();
+  const scale = (near * far(plot)) / length(at.eye);
+  for (const axis of "xyz") at.eye[axis] *= scale;
+  Plotly.relayout(plot, { "scene.camera": at });
+}
+for (const plot of document.querySelectorAll(".plot")) places.observe(plot);
 
 function drawViews({ views }) {
   byId("views-part").hidden = !views.figures.length;

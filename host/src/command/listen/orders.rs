@@ -1,0 +1,68 @@
+//! What a device is told of how to look: by flags at first, and then by the page.
+
+use super::Args;
+use super::desk::Desk;
+use crate::live::control::Settings;
+use crate::source::exposure::Exposure;
+use crate::source::serial::session::{Session, SessionError};
+use shared::wire::{self, ExposureSetting, ToDevice};
+
+/// What a device can be told of how it looks.
+pub(super) const ORDERS: [&str; 3] = ["threshold", "polarity", "exposure"];
+
+/// What the device is to be told: nothing that nobody has said.
+pub(super) struct Orders {
+    /// For a device that begins, one of each of [`ORDERS`]: what was asked for at first, and what it obeyed since.
+    kept: [Option<ToDevice>; ORDERS.len()],
+    /// What of the page the device was told.
+    settings: Settings,
+}
+
+impl Orders {
+    /// What the flags say, and with a page all that it shows as set.
+    pub(super) fn new(args: &Args, settings: Settings) -> Self {
+        let shown = args.view.is_wanted();
+        let threshold = args.threshold.or_else(|| shown.then_some(settings.threshold));
+        let polarity = args.polarity.or_else(|| shown.then_some(settings.polarity));
+        Self { kept: [threshold.map(ToDevice::Threshold), polarity.map(ToDevice::Polarity), None], settings }
+    }
+
+    /// Has a device that was greeted begin.
+    pub(super) fn start(&self, session: &mut Session, desk: &mut Desk<'_>) -> Result<(), SessionError> {
+        for (which, order) in self.kept.iter().enumerate() {
+            if let Some(order) = order {
+                desk.give(session, which, order)?;
+            }
+        }
+        session.order_cameras(&ToDevice::Start)
+    }
+
+    /// Passes on what was changed on the page.
+    pub(super) fn follow(&mut self, session: &mut Session, desk: &mut Desk<'_>) -> Result<(), SessionError> {
+        let Some(view) = &desk.view else { return Ok(()) };
+        let ((settings, _), before) = (view.control().settings(), self.settings);
+        let exposure = settings.exposure.filter(|_| settings.exposure != before.exposure);
+        let exposure = exposure.map(|exposure| match exposure {
+            Exposure::Auto => ExposureSetting::Auto,
+            Exposure::Fixed(lines) => ExposureSetting::Fixed(desk.gains.map(|gain| {
+                let lines = u16::try_from(lines).unwrap_or(u16::MAX);
+                wire::Exposure { lines, gain }
+            })),
+        });
+        let changed = [
+            (settings.threshold != before.threshold).then_some(ToDevice::Threshold(settings.threshold)),
+            (settings.polarity != before.polarity).then_some(ToDevice::Polarity(settings.polarity)),
+            exposure.map(ToDevice::Exposure),
+        ];
+        for (which, order) in changed.into_iter().enumerate() {
+            if let Some(order) = order
+                && desk.give(session, which, &order)?
+            {
+                self.kept[which] = Some(order);
+            }
+        }
+        // Not before: what a device did not hear, because it was lost, it is told when it is back.
+        self.settings = settings;
+        Ok(())
+    }
+}
