@@ -156,7 +156,7 @@ same_elsewhere() {
 }
 
 part_firmware() {
-    board_target
+    emulator
     # Boards exclude each other: one at a time, and each is looked at as closely as the rest.
     local features
     for features in h743 mps2; do
@@ -168,7 +168,8 @@ part_firmware() {
     # As the user builds it, and what it takes.
     check cargo build -q -p firmware --target "$TARGET" --release --locked
     check same_elsewhere
-    tests cargo test -q --locked -p system-tests --test footprint -- --nocapture
+    # What it takes, and what it is made of: panics, the deepest stack.
+    tests cargo test -q --locked -p system-tests --test footprint --test images -- --nocapture
 }
 
 # What images take; the core on emulated boards held against the core on this machine, stage by stage, and to

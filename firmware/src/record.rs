@@ -63,7 +63,8 @@ impl<F: NorFlash> Record<F> {
     fn header(&mut self, sector: u32) -> Result<Option<Header>, FlashError> {
         let unit = self.read(self.start(sector))?;
         let (words, _) = unit.as_chunks::<4>();
-        let [magic, sequence, length, sum] = [0, 1, 2, 3].map(|i: usize| u32::from_le_bytes(words[i]));
+        let Some(words) = words.first_chunk() else { return Ok(None) };
+        let [magic, sequence, length, sum] = words.map(u32::from_le_bytes);
         let fits = length as usize <= self.capacity();
         Ok((magic == MAGIC && fits).then_some(Header { sequence, length, sum }))
     }
@@ -125,7 +126,9 @@ impl<F: NorFlash> Flash for Record<F> {
         let Some((sector, header)) = self.newest()? else { return Ok(0) };
         let (length, room) = (header.length as usize, buffer.len());
         let place = buffer.get_mut(..length).ok_or(FlashError::TooLong(room))?;
-        self.each(sector, header.length, |at, bytes| place[at..at + bytes.len()].copy_from_slice(bytes))?;
+        self.each(sector, header.length, |at, bytes| {
+            place.iter_mut().skip(at).zip(bytes).for_each(|(place, byte)| *place = *byte);
+        })?;
         Ok(length)
     }
 

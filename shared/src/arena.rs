@@ -10,7 +10,7 @@
 
 use crate::limits::CapacityError;
 use bytemuck::{Pod, cast_slice_mut, try_cast_slice_mut};
-use core::mem::take;
+use core::mem::{replace, take};
 use core::ops::{Deref, DerefMut};
 
 /// The rest of a block.
@@ -103,23 +103,21 @@ impl<'a, T: Copy> List<'a, T> {
     pub fn retain(&mut self, pass: impl Fn(&T) -> bool) {
         let mut kept = 0;
         for i in 0..self.len {
-            if pass(&self.entries[i]) {
-                self.entries[kept] = self.entries[i];
-                kept += 1;
+            let Some(&entry) = self.entries.get(i).filter(|entry| pass(entry)) else { continue };
+            if let Some(place) = self.entries.get_mut(kept) {
+                *place = entry;
             }
+            kept += 1;
         }
         self.len = kept;
     }
 
-    /// Take an entry out; the last one takes its place.
-    ///
-    /// # Panics
-    /// Never for an index of the list.
-    pub fn swap_remove(&mut self, index: usize) -> T {
-        let entry = self[index];
+    /// Take an entry out, if it is there; the last one takes its place.
+    pub fn swap_remove(&mut self, index: usize) -> Option<T> {
+        let last = *self.last()?;
+        let entry = replace(self.get_mut(index)?, last);
         self.len -= 1;
-        self.entries[index] = self.entries[self.len];
-        entry
+        Some(entry)
     }
 }
 
@@ -127,13 +125,13 @@ impl<T> Deref for List<'_, T> {
     type Target = [T];
 
     fn deref(&self) -> &[T] {
-        &self.entries[..self.len]
+        self.entries.get(..self.len).unwrap_or_default()
     }
 }
 
 impl<T> DerefMut for List<'_, T> {
     fn deref_mut(&mut self) -> &mut [T] {
-        &mut self.entries[..self.len]
+        self.entries.get_mut(..self.len).unwrap_or_default()
     }
 }
 
@@ -171,7 +169,7 @@ mod tests {
         }
         assert_eq!(list.push(4), Err(CapacityError { what: "numbers", limit: 4 }));
         list.retain(|k| *k != 1);
-        assert_eq!(list.swap_remove(0), 0);
+        assert_eq!([list.swap_remove(3), list.swap_remove(0)], [None, Some(0)]);
         assert_eq!(*list, [3, 2]);
         list.clear();
         assert!(list.is_empty());

@@ -18,6 +18,7 @@
 use crate::limits::{CapacityError, MAX_SIDE};
 use crate::point::Pixel;
 use core::fmt;
+use core::num::NonZeroUsize;
 
 /// The unit of pixel-parallel work: what the processor handles in one register.
 #[cfg(target_pointer_width = "64")]
@@ -136,15 +137,18 @@ impl<'a> Bitmap<'a> {
     /// Whether the pixel is set; false outside the image.
     pub fn get(&self, u: i32, v: i32) -> bool {
         self.size.contains(u, v)
-            && self.words[v as usize * self.row_words + u as usize / WORD_BITS] >> (u as usize % WORD_BITS)
+            && at(self.words, v as usize * self.row_words + u as usize / WORD_BITS)
+                >> (u as usize % WORD_BITS)
                 & 1
                 == 1
     }
 
     /// Set or clear a pixel; nothing happens outside the image.
     pub fn put(&mut self, u: usize, v: usize, on: bool) {
-        if u < self.size.width && v < self.size.height {
-            let word = &mut self.words[v * self.row_words + u / WORD_BITS];
+        if u < self.size.width
+            && v < self.size.height
+            && let Some(word) = self.words.get_mut(v * self.row_words + u / WORD_BITS)
+        {
             let bit = 1 << (u % WORD_BITS);
             if on { *word |= bit } else { *word &= !bit }
         }
@@ -154,7 +158,7 @@ impl<'a> Bitmap<'a> {
     pub fn row(&self, v: i32) -> &[Word] {
         let n = self.row_words;
         match usize::try_from(v) {
-            Ok(v) if v < self.size.height => &self.words[v * n..(v + 1) * n],
+            Ok(v) if v < self.size.height => self.words.get(v * n..(v + 1) * n).unwrap_or_default(),
             _ => &[],
         }
     }
@@ -163,9 +167,14 @@ impl<'a> Bitmap<'a> {
     pub fn row_mut(&mut self, v: i32) -> &mut [Word] {
         let n = self.row_words;
         match usize::try_from(v) {
-            Ok(v) if v < self.size.height => &mut self.words[v * n..(v + 1) * n],
+            Ok(v) if v < self.size.height => self.words.get_mut(v * n..(v + 1) * n).unwrap_or_default(),
             _ => &mut [],
         }
+    }
+
+    /// Words from a row to the next: what an index is divided by.
+    fn pitch(&self) -> NonZeroUsize {
+        NonZeroUsize::new(self.row_words).unwrap_or(NonZeroUsize::MIN)
     }
 
     /// All words, row after row.
@@ -231,7 +240,8 @@ impl<'a> Bitmap<'a> {
 
     /// Each row that has a set pixel, with its first and its last one: `(v, first, last)`.
     pub fn spans(&self) -> impl Iterator<Item = (usize, usize, usize)> + '_ {
-        self.words.chunks_exact(self.row_words.max(1)).enumerate().filter_map(|(v, row)| {
+        let rows = self.words.chunks_exact(self.row_words.max(1));
+        (0..self.size.height).zip(rows).filter_map(|(v, row)| {
             let first = row.iter().position(|w| *w != 0)?;
             let last = row.iter().rposition(|w| *w != 0)?;
             Some((
@@ -244,7 +254,7 @@ impl<'a> Bitmap<'a> {
 
     /// The set pixels in raster order.
     pub fn pixels(&self) -> impl Iterator<Item = Pixel> + '_ {
-        let n = self.row_words.max(1);
+        let n = self.pitch();
         self.words.iter().enumerate().flat_map(move |(i, &word)| {
             let (v, u0) = (i / n, i % n * WORD_BITS);
             SetBits(word).map(move |b| Pixel { u: (u0 + b) as u16, v: v as u16 })
@@ -278,19 +288,15 @@ impl<'a> Bitmap<'a> {
     #[inline]
     pub fn clear_if(&mut self, place: usize, decide: impl Fn(u8) -> bool) -> bool {
         let (i, bit) = (place / WORD_BITS, place % WORD_BITS);
-        if i >= self.words.len() {
-            return false;
-        }
         let neighbours = if bit == 0 || bit == WORD_BITS - 1 {
-            self.neighbours_apart((i % self.row_words * WORD_BITS + bit) as i32, (i / self.row_words) as i32)
+            let n = self.pitch();
+            self.neighbours_apart((i % n * WORD_BITS + bit) as i32, (i / n) as i32)
         } else {
             self.neighbours_within(i, bit)
         };
-        let goes = decide(neighbours);
-        if goes {
-            self.words[i] &= !(1 << bit);
-        }
-        goes
+        let Some(word) = self.words.get_mut(i).filter(|_| decide(neighbours)) else { return false };
+        *word &= !(1 << bit);
+        true
     }
 
     /// [`Self::neighbours`], some of which lie in another word or outside.
@@ -424,7 +430,7 @@ impl<'a, T: Copy + Default> Plane<'a, T> {
     /// The value at a pixel; the default outside the image.
     pub fn get(&self, u: i32, v: i32) -> T {
         if self.size.contains(u, v) {
-            self.data[v as usize * self.size.width + u as usize]
+            self.data.get(v as usize * self.size.width + u as usize).copied().unwrap_or_default()
         } else {
             T::default()
         }
@@ -432,13 +438,17 @@ impl<'a, T: Copy + Default> Plane<'a, T> {
 
     /// A row; empty outside the image.
     pub fn row(&self, v: usize) -> &[T] {
-        if v < self.size.height { &self.data[v * self.size.width..(v + 1) * self.size.width] } else { &[] }
+        if v < self.size.height {
+            self.data.get(v * self.size.width..(v + 1) * self.size.width).unwrap_or_default()
+        } else {
+            &[]
+        }
     }
 
     /// A row, to be changed; empty outside the image.
     pub fn row_mut(&mut self, v: usize) -> &mut [T] {
         if v < self.size.height {
-            &mut self.data[v * self.size.width..(v + 1) * self.size.width]
+            self.data.get_mut(v * self.size.width..(v + 1) * self.size.width).unwrap_or_default()
         } else {
             &mut []
         }
@@ -485,7 +495,7 @@ impl<'a> Grey<'a> {
     /// A row; empty outside the image.
     pub fn row(&self, v: usize) -> &'a [u8] {
         if v < self.size.height {
-            &self.data[v * self.stride..v * self.stride + self.size.width]
+            self.data.get(v * self.stride..v * self.stride + self.size.width).unwrap_or_default()
         } else {
             &[]
         }

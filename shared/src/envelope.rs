@@ -75,16 +75,22 @@ impl<'a> Envelope<'a> {
         }
     }
 
-    const fn entry(&self, row: usize, column: usize) -> i64 {
-        self.entries[self.slot(row, column)]
+    fn entry(&self, row: usize, column: usize) -> i64 {
+        self.entries.get(self.slot(row, column)).copied().unwrap_or(0)
+    }
+
+    fn change(&mut self, row: usize, column: usize, change: impl FnOnce(i64) -> i64) {
+        let slot = self.slot(row, column);
+        if let Some(entry) = self.entries.get_mut(slot) {
+            *entry = change(*entry);
+        }
     }
 
     /// Add to the entry at (i, j) and (j, i); nothing happens outside the envelope.
     pub fn add(&mut self, i: usize, j: usize, value: i64) {
         let (row, column) = (i.max(j), i.min(j));
         if row < self.rows && column >= self.first(row) {
-            let slot = self.slot(row, column);
-            self.entries[slot] = bounded(self.entries[slot].saturating_add(value));
+            self.change(row, column, |entry| bounded(entry.saturating_add(value)));
         }
     }
 
@@ -104,20 +110,21 @@ impl<'a> Envelope<'a> {
                 let sum: i128 = (from.max(self.first(j))..j)
                     .map(|k| self.entry(i, k) as i128 * self.entry(j, k) as i128)
                     .sum();
-                let slot = self.slot(i, j);
-                self.entries[slot] = self.entries[slot].saturating_sub(shift(sum, ENTRY_BITS));
+                self.change(i, j, |entry| entry.saturating_sub(shift(sum, ENTRY_BITS)));
             }
             let mut sum = 0;
             for k in from..i {
-                let slot = self.slot(i, k);
-                let c = self.entries[slot];
-                let l = shift(c as i128 * self.entry(k, k) as i128, ENTRY_BITS);
-                sum += c as i128 * l as i128;
-                self.entries[slot] = l;
+                let inverse = self.entry(k, k) as i128;
+                self.change(i, k, |c| {
+                    let l = shift(c as i128 * inverse, ENTRY_BITS);
+                    sum += c as i128 * l as i128;
+                    l
+                });
             }
-            let slot = self.slot(i, i);
-            let pivot = self.entries[slot].saturating_sub(shift(sum, ENTRY_BITS)).max(LEAST_PIVOT);
-            self.entries[slot] = (1 << (2 * ENTRY_BITS)) / pivot;
+            self.change(i, i, |entry| {
+                let pivot = entry.saturating_sub(shift(sum, ENTRY_BITS)).max(LEAST_PIVOT);
+                (1 << (2 * ENTRY_BITS)) / pivot
+            });
         }
     }
 

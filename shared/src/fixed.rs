@@ -28,15 +28,22 @@ pub const fn div_round(n: i64, d: i64) -> i64 {
     if (n < 0) != (d < 0) { -q } else { q }
 }
 
-/// `n / d` rounded down; `d` is not 0. One instruction where both have 32 bits, as they nearly always have: a
+/// `n / d` rounded down; 0 when `d` is 0. One instruction where both have 32 bits, as they nearly always have: a
 /// microcontroller divides longer ones in software.
 pub const fn div_floor(n: u64, d: u64) -> u64 {
-    if (n | d) >> 32 == 0 {
-        (n as u32 / d as u32) as u64
-    } else if cfg!(target_pointer_width = "64") {
-        n / d
-    } else {
-        div_long(n, d)
+    if (n | d) >> 32 != 0 {
+        return if cfg!(target_pointer_width = "64") { quotient(n, d) } else { div_long(n, d) };
+    }
+    match (n as u32).checked_div(d as u32) {
+        Some(q) => q as u64,
+        None => 0,
+    }
+}
+
+const fn quotient(n: u64, d: u64) -> u64 {
+    match n.checked_div(d) {
+        Some(q) => q,
+        None => 0,
     }
 }
 
@@ -45,7 +52,7 @@ pub const fn div_floor(n: u64, d: u64) -> u64 {
 #[inline(never)]
 const fn div_long(n: u64, d: u64) -> u64 {
     if d >> 32 != 0 || n >> 32 >= d {
-        return n / d;
+        return quotient(n, d);
     }
     let bits = (d as u32).leading_zeros();
     let (n, d) = (n << bits, (d as u32) << bits);
@@ -56,7 +63,8 @@ const fn div_long(n: u64, d: u64) -> u64 {
 
 /// Quotient and rest of `high << 16 | next` and `d`, of which `high` is the smaller and `d` has its highest bit.
 const fn digit(high: u32, next: u32, d: u32) -> (u32, u32) {
-    let (d1, d0) = (d >> 16, d & 0xFFFF);
+    // The highest bit said once more: then the compiler knows that this is no division by 0.
+    let (d1, d0) = (d >> 16 | 1 << 15, d & 0xFFFF);
     let (mut q, mut rest) = (high / d1, high % d1);
     // At most two too large.
     while rest >> 16 == 0 && (q >> 16 != 0 || q * d0 > (rest << 16 | next)) {

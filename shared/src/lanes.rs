@@ -4,7 +4,7 @@
 //! Code that is generic over it must be inlined into whoever says which lanes to take, so that it is compiled
 //! for the registers of that caller.
 
-use crate::bitmap::Word;
+use crate::bitmap::{self, Word};
 use core::ops::{BitAnd, BitOr, BitXor, Not, Shl, Shr};
 
 /// Words side by side. Shifts are of each word by itself.
@@ -23,23 +23,17 @@ pub trait Lanes:
     /// The same word everywhere.
     fn splat(word: Word) -> Self;
 
-    /// The words from `at` on.
-    ///
-    /// # Panics
-    /// When there are fewer than [`Self::WORDS`].
+    /// The words from `at` on; where there are fewer than [`Self::WORDS`] it may panic.
     fn load(words: &[Word], at: usize) -> Self;
 
-    /// Write the words from `at` on.
-    ///
-    /// # Panics
-    /// When there are fewer than [`Self::WORDS`].
+    /// Write the words from `at` on; where there are fewer than [`Self::WORDS`] it may panic.
     fn store(self, words: &mut [Word], at: usize);
 
     /// Bit `k` for each word `k` that has one of these bits.
     fn with(self, bits: Word) -> Word;
 }
 
-/// What every machine has.
+/// What every machine has. It panics nowhere: a word that is not there is 0.
 impl Lanes for Word {
     const WORDS: usize = 1;
 
@@ -50,12 +44,14 @@ impl Lanes for Word {
 
     #[inline(always)]
     fn load(words: &[Word], at: usize) -> Self {
-        words[at]
+        bitmap::at(words, at)
     }
 
     #[inline(always)]
     fn store(self, words: &mut [Word], at: usize) {
-        words[at] = self;
+        if let Some(word) = words.get_mut(at) {
+            *word = self;
+        }
     }
 
     #[inline(always)]

@@ -124,7 +124,8 @@ impl<'a, P: Placed> Strips<'a, P> {
         });
         for (strip, (from, level)) in strips.iter_mut().zip(starts) {
             let place = (from as u32) << PLACE_BITS | level;
-            *strip = Strip::around(&points[from..count.min(from + length(level))], place);
+            let stretch = points.get(from..count.min(from + length(level))).unwrap_or_default();
+            *strip = Strip::around(stretch, place);
         }
         Ok(Self { points, strips })
     }

@@ -4,7 +4,9 @@
 
 #[cfg(target_os = "none")]
 mod board {
-    use defmt::{Debug2Format, info, panic};
+    use cortex_m::asm::wfi;
+    use cortex_m::peripheral::SCB;
+    use defmt::{error, info};
     use embassy_time::{Duration, block_for};
     use firmware::board::h743::Board;
     use firmware::device::{Condition, Desk, Device};
@@ -19,16 +21,30 @@ mod board {
     static STORAGE: ConstStaticCell<Qvga> = ConstStaticCell::new(Qvga::new());
     static DESK: ConstStaticCell<Desk<KNOTS>> = ConstStaticCell::new(Desk::new());
 
+    const fn name(condition: Condition) -> &'static str {
+        match condition {
+            Condition::Starting => "starting",
+            Condition::Ready => "ready",
+            Condition::Working => "working",
+            Condition::Faulty => "faulty",
+        }
+    }
+
     #[cortex_m_rt::entry]
     fn main() -> ! {
-        let Board { mut ports, mut lamps, birth } = Board::take().expect("taken once");
-        info!("started: {}", Debug2Format(&birth));
+        let Some(Board { mut ports, mut lamps, birth }) = Board::take() else { SCB::sys_reset() };
+        // By the codes of docs/wire-format.md: text of core's, made at run time, would call itself.
+        info!("started: reset {=u8}, {=u32} by the watchdog", birth.reset as u8, birth.watchdog_resets);
         let storage = STORAGE.take();
         match selftest::run(storage) {
             Ok(disparity) => info!("self-test: the ring's disparity is {} / 256 px", disparity),
-            Err(finding) => {
+            Err(_) => {
                 lamps.show(Condition::Faulty);
-                panic!("self-test: {}", Debug2Format(&finding));
+                error!("self-test: the ring is not found");
+                // What is wrong with the memory or the processor is wrong after a reset too.
+                loop {
+                    wfi();
+                }
             }
         }
         let mut device = Device::new(storage, DESK.take(), birth);
@@ -37,7 +53,7 @@ mod board {
             let pace = step(&mut device, &mut ports);
             let condition = device.condition();
             if condition != shown {
-                info!("{}", Debug2Format(&condition));
+                info!("{=str}", name(condition));
                 lamps.show(condition);
                 shown = condition;
             }

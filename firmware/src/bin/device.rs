@@ -7,12 +7,11 @@
 #[cfg(target_os = "none")]
 mod board {
     use cortex_m::asm::delay;
-    use firmware::board::mps2::{Board, Eyes, argument};
-    use firmware::device::{Birth, Desk, Device};
+    use firmware::board::mps2::{Board, Eyes, argument, refuse};
+    use firmware::device::{Desk, Device};
     use firmware::drive::{Pace, Ports, step};
     use firmware::memory::{Qvga, Storage};
     use shared::stage::warp::knots;
-    use shared::wire::ResetReason;
     use static_cell::ConstStaticCell;
 
     const KNOTS: usize = knots(Qvga::CAPACITIES.size);
@@ -24,10 +23,11 @@ mod board {
 
     #[cortex_m_rt::entry]
     fn main() -> ! {
-        let Board { uart, clock, flash, watchdog, .. } = Board::take().expect("taken once");
+        let Some(Board { uart, clock, flash, watchdog, birth, .. }) = Board::take() else {
+            refuse("this runs twice")
+        };
         let cameras = Eyes::new(argument(), &clock);
         let mut ports = Ports { cameras, link: uart, clock: &clock, flash, watchdog };
-        let birth = Birth { board: "emulated MPS2", reset: ResetReason::Unknown, watchdog_resets: 0 };
         let mut device = Device::new(STORAGE.take(), DESK.take(), birth);
         loop {
             if step(&mut device, &mut ports) == Pace::Idle {

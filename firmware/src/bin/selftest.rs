@@ -3,6 +3,7 @@
 
 #[cfg(target_os = "none")]
 mod board {
+    use firmware::board::mps2::refuse;
     use firmware::memory::Small;
     use firmware::selftest::run;
     use semihosting::{println, process};
@@ -12,8 +13,10 @@ mod board {
 
     #[cortex_m_rt::entry]
     fn main() -> ! {
-        let disparity = run(STORAGE.take()).expect("the ring is found");
-        println!("disparity {disparity}");
+        match run(STORAGE.take()) {
+            Ok(disparity) => println!("disparity {disparity}"),
+            Err(finding) => refuse(format_args!("{finding:?}")),
+        }
         process::exit(0)
     }
 }

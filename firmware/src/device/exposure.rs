@@ -50,7 +50,7 @@ impl Rung {
     pub const fn exposure(self) -> Exposure {
         // Quarters of an octave from 4 lines on, 1/16.
         const QUARTERS: [u32; OCTAVE as usize] = [64, 76, 91, 108];
-        let quarter = QUARTERS[(self.0 % OCTAVE) as usize] << (self.0 / OCTAVE);
+        let quarter = QUARTERS[self.0 as usize % QUARTERS.len()] << (self.0 / OCTAVE);
         let longest = *Exposure::LINES.end() as u32;
         let lines = (quarter + 8) / 16;
         if lines <= longest {

@@ -202,7 +202,7 @@ impl Device<'_> {
         let Some(Job { step: Step::Fetch(side), .. }) = self.job else { return };
         let warped = self.calibration.warp(side).is_some();
         let Ok(raw) = raw_place(self.memory.scratch, self.size, warped) else { return };
-        let Some(place) = raw.chunks_exact_mut(self.size.width).nth(row) else { return };
+        let Some(place) = raw.chunks_exact_mut(self.size.width.max(1)).nth(row) else { return };
         if luma.len() == place.len() && row == self.meter.rows {
             place.copy_from_slice(luma);
             self.meter.take(luma);
@@ -235,7 +235,7 @@ impl Device<'_> {
         if let Some(warp) = self.calibration.warp(side) {
             let raw = rest.fork().take(self.size.pixels(), "pixels in a picture")?;
             let raw = Grey::new(self.size, self.size.width, raw)?;
-            for (v, row) in picture.chunks_exact_mut(self.size.width).enumerate() {
+            for (v, row) in picture.chunks_exact_mut(self.size.width.max(1)).enumerate() {
                 warp.row(v, raw, row);
             }
         }

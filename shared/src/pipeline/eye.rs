@@ -232,7 +232,8 @@ pub(super) fn fit_curves(
     eye.controls.clear();
     for branch in eye.branches.iter_mut() {
         branch.controls = eye.controls.len();
-        let samples = &eye.samples[branch.samples..branch.samples + branch.sample_count];
+        let samples = branch.samples..branch.samples + branch.sample_count;
+        let samples = eye.samples.get(samples).unwrap_or_default();
         branch.control_count = nurbs::fit(samples, branch.closed, params, scratch.fork(), eye.controls)?;
     }
     Ok(())

@@ -4,13 +4,12 @@ use super::finding::Gates;
 use super::{Finding, Memory, Observer, Product, Side};
 use crate::arena::Arena;
 use crate::bitmap::{Bitmap, Size, Word};
-use crate::point::Pixel;
+use crate::point::{Pixel, PixelPoint};
 use crate::stage::boundary::{Element, boundary};
 use crate::stage::branch::Sample;
 use crate::stage::correspond::{PaperMatching, match_vertices};
 use crate::stage::hull::{bitmap_extents, convex_hull};
 use crate::stage::nearest::pair_nearest;
-use heapless::VecView;
 
 /// The paper's reduced hulls have at most this many vertices: n^3 triples are looked at.
 pub const PAPER_VERTICES: usize = 24;
@@ -41,15 +40,17 @@ pub(super) fn match_as_paper(
     let boundaries = [edge(left.mask)?, edge(right.mask)?];
     let points = |i: usize| boundaries[i].pixels().map(Pixel::centre);
     pair_nearest(points(0), || points(1), &matched.map, scratch.fork(), memory.boundary_pairs)?;
-    let skeleton = |samples: &'_ VecView<Sample>, k: usize| samples[k].ball.at();
-    let (l, r) = (&*left.samples, &*right.samples);
     pair_nearest(
-        (0..l.len()).map(|k| skeleton(l, k)),
-        || (0..r.len()).map(|k| skeleton(r, k)),
+        centres(left.samples),
+        || centres(right.samples),
         &matched.map,
         scratch,
         memory.skeleton_pairs,
     )?;
     observer.saw(None, Product::Pairs(memory.boundary_pairs, memory.skeleton_pairs));
     Ok(())
+}
+
+fn centres(samples: &[Sample]) -> impl Iterator<Item = PixelPoint> {
+    samples.iter().map(|sample| sample.ball.at())
 }

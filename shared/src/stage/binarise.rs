@@ -232,7 +232,11 @@ pub fn histogram(grey: Grey<'_>) -> Histogram {
         }
         count_row(&mut tables[0][0], rest);
     }
-    core::array::from_fn(|value| tables.as_flattened().iter().map(|table| table[value]).sum())
+    let mut sums = [0; 256];
+    for table in tables.as_flattened() {
+        sums.iter_mut().zip(table).for_each(|(sum, count)| *sum += count);
+    }
+    sums
 }
 
 /// Otsu's level: the first one that maximises the variance between the values up to it and those above

@@ -47,15 +47,18 @@ pub fn boundary<'w>(
     let all = bitmap.words();
     let border = n.min(all.len());
     // Every set pixel of the first and the last row is boundary.
-    out.words_mut()[..border].copy_from_slice(&all[..border]);
     let last = all.len() - border;
-    out.words_mut()[last..].copy_from_slice(&all[last..]);
+    for row in [0..border, last..all.len()] {
+        let to = out.words_mut().get_mut(row.clone()).unwrap_or_default();
+        to.iter_mut().zip(all.get(row).unwrap_or_default()).for_each(|(to, from)| *to = *from);
+    }
 
     let inner = out.words_mut().get_mut(n..last).unwrap_or_default();
-    let at_once = TOGETHER / n * n;
+    let at_once = (TOGETHER / n * n).max(n);
     for (k, out) in inner.chunks_mut(at_once).enumerate() {
         let start = n + k * at_once;
-        let [above, here, below] = [start - n, start, start + n].map(|first| &all[first..first + out.len()]);
+        let [above, here, below] =
+            [start - n, start, start + n].map(|first| all.get(first..first + out.len()).unwrap_or_default());
         if here.iter().fold(0, |any, word| any | word) == 0 {
             out.fill(0);
             continue;
@@ -63,8 +66,12 @@ pub fn boundary<'w>(
         within(element, [above, here, below], out);
         let last = 1 << ((size.width - 1) % WORD_BITS);
         for (out, here) in out.chunks_exact_mut(n).zip(here.chunks_exact(n)) {
-            out[0] |= here[0] & 1;
-            out[n - 1] |= here[n - 1] & last;
+            if let (Some(out), Some(here)) = (out.first_mut(), here.first()) {
+                *out |= here & 1;
+            }
+            if let (Some(out), Some(here)) = (out.last_mut(), here.last()) {
+                *out |= here & last;
+            }
         }
     }
     Ok(out)
@@ -74,8 +81,9 @@ pub fn boundary<'w>(
 fn within(element: Element, [above, here, below]: [&[Word]; 3], out: &mut [Word]) {
     // What the pixels to the west and to the east must have too, with a clear word at either end.
     let mut columns = [0; TOGETHER + 2];
-    let columns = &mut columns[..here.len() + 2];
-    for (((column, a), b), c) in columns[1..].iter_mut().zip(above).zip(here).zip(below) {
+    let columns = columns.get_mut(..here.len() + 2).unwrap_or_default();
+    let inner = columns.get_mut(1..).unwrap_or_default();
+    for (((column, a), b), c) in inner.iter_mut().zip(above).zip(here).zip(below) {
         *column = if element == Element::Square { a & b & c } else { *b };
     }
     for ((out, here), beside) in out.iter_mut().zip(here).zip(columns.windows(3)) {

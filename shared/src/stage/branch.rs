@@ -112,9 +112,10 @@ pub fn trace_branch(
         continue_tip(start, balls, samples)?;
     }
     if free[0] {
-        samples[start..].reverse();
+        let turn = |samples: &mut VecView<Sample>| samples.get_mut(start..).unwrap_or_default().reverse();
+        turn(samples);
         continue_tip(start, balls, samples)?;
-        samples[start..].reverse();
+        turn(samples);
     }
     Ok(())
 }
@@ -169,11 +170,12 @@ fn averages(pixels: &[Pixel], balls: &Balls<'_>) -> [Average; TOGETHER] {
     let far = pixels.iter().map(|p| centre.distance_squared(p.centre())).max().unwrap_or(0);
     let radius = REACH + isqrt(far.cast_unsigned()) as i32 + 1;
     balls.strips.walk(Disc { centre, radius }, |k, ball, _| {
+        let Some(depth) = balls.depths.get(k) else { return };
         for (average, pixel) in averages.iter_mut().zip(pixels) {
             let near = reach_squared - pixel.centre().distance_squared(ball.centre);
             if near > 0 {
                 // At most 2^18 each; 24 bits of their product are kept, so that 2^16 balls fit.
-                average.add(((near * near) >> 12) as i32, Sample::of(ball, &balls.depths[k]));
+                average.add(((near * near) >> 12) as i32, Sample::of(ball, depth));
             }
         }
     });
@@ -186,11 +188,12 @@ fn continue_tip(start: usize, balls: &Balls<'_>, samples: &mut VecView<Sample>) 
         return Ok(());
     }
     // From its last ball an object reaches on for at most a few radii: a right angle for 1.4.
-    let mut left = 2 * samples[samples.len() - 1].ball.rho;
+    let Some(mut tip) = samples.last().map(|last| last.ball) else { return Ok(()) };
+    let mut left = 2 * tip.rho;
     loop {
-        let tip = samples[samples.len() - 1].ball;
-        let behind = samples[start.max(samples.len() - 1 - TIP_SPAN.min(samples.len() - 1))].ball;
-        let Some(direction) = Direction::of(tip.u - behind.u, tip.v - behind.v) else { return Ok(()) };
+        let behind = samples.get(start.max(samples.len().saturating_sub(1 + TIP_SPAN))).map(|s| s.ball);
+        let direction = behind.and_then(|behind| Direction::of(tip.u - behind.u, tip.v - behind.v));
+        let Some(direction) = direction else { return Ok(()) };
         let across = Direction { u: -direction.v, v: direction.u };
         // Of equals the first.
         let (mut step, mut next) = (TIP_REACH.min(left), None);
@@ -199,11 +202,13 @@ fn continue_tip(start: usize, balls: &Balls<'_>, samples: &mut VecView<Sample>) 
             let aside = across.along(tip.at(), ball.centre).abs();
             let lies_ahead = along > TIP_STEP && along < step && aside < PX + along / 10;
             if lies_ahead && ball.rho <= tip.rho + PX / 4 {
-                (step, next, *disc) = (along, Some((ball, &balls.depths[k])), ahead(tip.at(), along));
+                (step, next) = (along, balls.depths.get(k).map(|depth| Sample::of(ball, depth)));
+                *disc = ahead(tip.at(), along);
             }
         });
-        let Some((ball, depth)) = next else { return Ok(()) };
-        push(samples, Sample::of(ball, depth), "branch samples")?;
+        let Some(sample) = next else { return Ok(()) };
+        push(samples, sample, "branch samples")?;
+        tip = sample.ball;
         left -= step;
     }
 }

@@ -113,10 +113,12 @@ pub fn dilate(bitmap: &mut Bitmap<'_>) {
         for i in 0..size.row_words() {
             let valid = bitmap.valid(i);
             let row = bitmap.row_mut(v as i32);
-            let word = row[i];
-            let spread = word | word << 1 | word >> 1;
-            row[i] = (spread | west >> (WORD_BITS - 1) | at(row, i + 1) << (WORD_BITS - 1)) & valid;
-            west = word;
+            let (here, east) = (at(row, i), at(row, i + 1));
+            let spread = here | here << 1 | here >> 1;
+            if let Some(word) = row.get_mut(i) {
+                *word = (spread | west >> (WORD_BITS - 1) | east << (WORD_BITS - 1)) & valid;
+            }
+            west = here;
         }
     }
     for i in 0..size.row_words() {
@@ -124,9 +126,11 @@ pub fn dilate(bitmap: &mut Bitmap<'_>) {
         for v in 0..size.height as i32 {
             let below = at(bitmap.row(v + 1), i);
             let row = bitmap.row_mut(v);
-            let word = row[i];
-            row[i] |= above | below;
-            above = word;
+            let here = at(row, i);
+            if let Some(word) = row.get_mut(i) {
+                *word |= above | below;
+            }
+            above = here;
         }
     }
 }
@@ -228,8 +232,11 @@ impl Flood<'_, '_, '_> {
 
     /// Take over the runs of the fresh pixels of a word, which need not wait any longer; returns both.
     fn take_runs(&mut self, (v, i): Place, fresh: Word) -> Word {
-        self.front.row_mut(v)[i] = 0;
-        let word = &mut self.bitmap.row_mut(v)[i];
+        let (Some(front), Some(word)) = (self.front.row_mut(v).get_mut(i), self.bitmap.row_mut(v).get_mut(i))
+        else {
+            return 0;
+        };
+        *front = 0;
         let run = complete_runs(fresh, *word ^ self.ground.mask() | fresh);
         *word ^= run & !fresh;
         run
@@ -254,7 +261,9 @@ impl Flood<'_, '_, '_> {
         let fresh = (*word ^ self.ground.mask()) & pixels;
         if fresh != 0 {
             *word ^= fresh;
-            self.front.row_mut(place.0)[place.1] |= fresh;
+            if let Some(front) = self.front.row_mut(place.0).get_mut(place.1) {
+                *front |= fresh;
+            }
             span.include(place);
         }
         fresh != 0

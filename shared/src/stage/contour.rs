@@ -53,7 +53,18 @@ impl ContourLoop {
     /// The index `offset` points further along the loop; |offset| <= len.
     pub const fn step(self, index: usize, offset: isize) -> usize {
         let from = (index - self.start) as isize + self.len as isize + offset;
-        self.start + from as usize % self.len
+        match (from as usize).checked_rem(self.len) {
+            Some(place) => self.start + place,
+            None => self.start,
+        }
+    }
+
+    /// How many points further along the loop `to` is than `from`.
+    pub const fn ahead(self, from: usize, to: usize) -> usize {
+        match (to + self.len - from).checked_rem(self.len) {
+            Some(points) => points,
+            None => 0,
+        }
     }
 }
 
@@ -179,7 +190,8 @@ fn place(grey: Option<Grey<'_>>, mask: &Bitmap<'_>, pixel: (i32, i32), axis: (i3
         let (object, background) = (level(-i32::from(two_inside)), level(1 + i32::from(two_outside)));
         let contrast = object - background;
         if contrast.abs() >= MIN_CONTRAST {
-            let covered = |k: i32| ((level(k) - background) * PX / contrast).clamp(0, PX);
+            let share = |k: i32| ((level(k) - background) * PX).checked_div(contrast).unwrap_or(0);
+            let covered = |k: i32| share(k).clamp(0, PX);
             let beyond = if two_outside { covered(1) } else { 0 };
             let missing = if two_inside { PX - covered(0) } else { 0 };
             shift = beyond - missing;
@@ -213,11 +225,16 @@ fn resample(
     let (step, parts) = (length / len, length % len);
     let (mut i, mut beyond, mut carried) = (0, 0, 0);
     for _ in 0..len {
-        while i + 1 < crossings.len() && i64::from(crossings[i].to_next) <= beyond {
-            beyond -= i64::from(crossings[i].to_next);
-            i += 1;
-        }
-        let (from, next) = (crossings[i], crossings.get(i + 1).map_or(first, |c| c.at));
+        let (from, next) = loop {
+            let Some(&from) = crossings.get(i) else { return Ok(()) };
+            match crossings.get(i + 1) {
+                Some(_) if i64::from(from.to_next) <= beyond => {
+                    beyond -= i64::from(from.to_next);
+                    i += 1;
+                }
+                next => break (from, next.map_or(first, |c| c.at)),
+            }
+        };
         let at = from.at.lerp(next, beyond as i32, from.to_next.into());
         let point = ContourPoint { at, normal: Direction::default(), border: from.border != 0 };
         push(points, point, "contour points")?;
@@ -227,8 +244,10 @@ fn resample(
         }
     }
     for i in here.range() {
-        let normal = normal(here, i, |k| points[k].at);
-        points[i].normal = normal;
+        let normal = normal(here, i, |k| points.get(k).map(|p| p.at).unwrap_or_default());
+        if let Some(point) = points.get_mut(i) {
+            point.normal = normal;
+        }
     }
     push(loops, here, "contour loops")
 }

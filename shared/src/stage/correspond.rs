@@ -28,6 +28,7 @@ use crate::limits::HULL_CUTS;
 use crate::point::{PixelPoint, orient};
 use crate::stage::invariants::{Measure, e_omega, feature_distance, feature_vector};
 use crate::stage::plane::AffineMap;
+use core::num::NonZeroUsize;
 use heapless::VecView;
 
 /// Vertices of a cut hull.
@@ -156,9 +157,11 @@ impl VertexMatch {
 pub fn reduce(hull: &mut VecView<PixelPoint>, n: usize) {
     while hull.len() > n.max(3) {
         let m = hull.len();
-        let area = |i: usize| orient(hull[(i + m - 1) % m], hull[i], hull[(i + 1) % m]).unsigned_abs();
+        let at = |i: usize| hull.get(i % m).copied().unwrap_or_default();
+        let area = |i: usize| orient(at(i + m - 1), at(i), at(i + 1)).unsigned_abs();
         let least = (0..m).min_by_key(|&i| area(i)).unwrap_or(0);
-        hull.remove(least);
+        let mut place = 0..;
+        hull.retain(|_| place.next() != Some(least));
     }
 }
 
@@ -173,15 +176,14 @@ pub fn match_vertices(
     paper: PaperMatching,
 ) -> Option<VertexMatch> {
     let n = left.len().min(right.len()).min(limit);
-    if n < 4 {
-        return None;
-    }
+    let around = NonZeroUsize::new(n).filter(|_| n >= 4)?;
     reduce(left, n);
     reduce(right, n);
     let areas = (doubled_area(left), doubled_area(right));
     let at = |shift: usize| {
         let (left, right) = (&*left, &*right);
-        move |k: usize| (left[k], right[(k + shift) % n])
+        let vertex = |hull: &[PixelPoint], k: usize| hull.get(k).copied().unwrap_or_default();
+        move |k: usize| (vertex(left, k), vertex(right, (k + shift) % around))
     };
     let agreeing =
         |shift: usize| triples(n).filter(|t| triple_agrees(*t, areas, &at(shift), paper.threshold)).count();
@@ -189,12 +191,12 @@ pub fn match_vertices(
     let error = |(i, j)| e_omega((left, i), (right, j), paper.omega, Measure::Ratio);
     let (i, j) = (0..n)
         .filter(|&shift| agreeing(shift) == most)
-        .flat_map(|shift| (0..n).map(move |i| (i, (i + shift) % n)))
+        .flat_map(|shift| (0..n).map(move |i| (i, (i + shift) % around)))
         .min_by_key(|&pair| error(pair))?;
-    let at = at((j + n - i) % n);
+    let at = at((j + n - i) % around);
     let seed = (paper.omega + 3).min(n);
     let agrees = |k: usize| {
-        (k + n - i) % n < seed
+        (k + n - i) % around < seed
             || triples(n).any(|t| t.contains(&k) && triple_agrees(t, areas, &at, paper.threshold))
     };
     let pairs = (0..n).filter(|&k| agrees(k)).map(at);

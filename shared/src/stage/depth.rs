@@ -58,8 +58,11 @@ pub fn ball_depths(
 ) -> Result<(), CapacityError> {
     depths.clear();
     for ball in balls {
-        let [p, q] = ball.contacts.map(|k| (&points[k as usize], &matches[k as usize]));
-        push(depths, depth(ball.rho, p, q, optics), "ball depths")?;
+        let depth = match ball.contacts.map(|k| points.get(k as usize).zip(matches.get(k as usize))) {
+            [Some(p), Some(q)] => depth(ball.rho, p, q, optics),
+            _ => BallDepth::default(),
+        };
+        push(depths, depth, "ball depths")?;
     }
     Ok(())
 }

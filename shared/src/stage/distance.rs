@@ -63,7 +63,8 @@ pub fn distance<'p>(
     let envelope = check(bitmap, scratch)?;
     for v in rows(bitmap) {
         for run in Runs::of(bitmap.row(v as i32)) {
-            along_run(&mut plane.row_mut(v)[run], envelope, |_, pixel, square| *pixel = root(square));
+            let pixels = plane.row_mut(v).get_mut(run).unwrap_or_default();
+            along_run(pixels, envelope, |_, pixel, square| *pixel = root(square));
         }
     }
     Ok(plane)
@@ -107,7 +108,7 @@ fn check<'s>(bitmap: &Bitmap<'_>, scratch: &'s mut [Parabola]) -> Result<&'s mut
 fn rows(bitmap: &Bitmap<'_>) -> Range<usize> {
     let first = bitmap.words().iter().position(|word| *word != 0);
     let last = bitmap.words().iter().rposition(|word| *word != 0);
-    let row = |word: usize| word / bitmap.size().row_words();
+    let row = |word: usize| word.checked_div(bitmap.size().row_words()).unwrap_or(0);
     first.zip(last).map_or(0..0, |(first, last)| row(first)..row(last) + 1)
 }
 
@@ -154,19 +155,21 @@ fn along_columns<'p>(bitmap: &Bitmap<'_>, data: &'p mut [u16]) -> Result<Plane<'
     let pixels = data.get_mut(..size.pixels()).ok_or(CapacityError { what: "pixels in a plane", limit })?;
     pixels.fill(0);
     for v in rows(bitmap) {
-        let (above, here) = pixels.split_at_mut(v * size.width);
+        let Some((above, here)) = pixels.split_at_mut_checked(v * size.width) else { break };
+        let above = v.checked_sub(1).and_then(|v| above.get(v * size.width..));
         for run in Runs::of(bitmap.row(v as i32)) {
-            let here = &mut here[run.clone()];
-            match above.rchunks_exact(size.width).next() {
-                Some(above) => here.iter_mut().zip(&above[run]).for_each(|(out, above)| *out = above + 1),
+            let here = here.get_mut(run.clone()).unwrap_or_default();
+            match above.and_then(|above| above.get(run)) {
+                Some(above) => here.iter_mut().zip(above).for_each(|(out, above)| *out = above + 1),
                 None => here.fill(1),
             }
         }
     }
     for v in rows(bitmap).rev() {
-        let (here, below) = pixels[v * size.width..].split_at_mut(size.width);
+        let rows = pixels.get_mut(v * size.width..).and_then(|rows| rows.split_at_mut_checked(size.width));
+        let Some((here, below)) = rows else { break };
         for run in Runs::of(bitmap.row(v as i32)) {
-            let here = &mut here[run.clone()];
+            let here = here.get_mut(run.clone()).unwrap_or_default();
             match below.get(run) {
                 Some(below) => {
                     here.iter_mut().zip(below).for_each(|(out, below)| *out = (*out).min(below + 1));
@@ -183,7 +186,7 @@ fn along_columns<'p>(bitmap: &Bitmap<'_>, data: &'p mut [u16]) -> Result<Plane<'
 fn along_run(run: &mut [u16], envelope: &mut [Parabola], mut emit: impl FnMut(usize, &mut u16, u32)) {
     let top = lower_envelope(run, envelope);
     let mut until = run.len();
-    for part in envelope[..=top].iter().rev() {
+    for part in envelope.get(..=top).unwrap_or_default().iter().rev() {
         let from = usize::from(part.from).max(1);
         // From one position to the next a parabola grows by 2 more than before.
         let (apex, x) = (u32::from(part.apex), from as u32);
@@ -203,7 +206,9 @@ fn along_run(run: &mut [u16], envelope: &mut [Parabola], mut emit: impl FnMut(us
 /// of its last part.
 fn lower_envelope(run: &[u16], envelope: &mut [Parabola]) -> usize {
     // The clear pixel before the run is 0 at position 0: nothing ever removes it.
-    envelope[0] = Parabola::NONE;
+    if let Some(zeroth) = envelope.first_mut() {
+        *zeroth = Parabola::NONE;
+    }
     let (mut top, mut last) = (0, Parabola::NONE);
     let end = run.len() as u32 + 1;
     for (x, &height) in (1..).zip(run.iter().chain(&[0])) {
@@ -216,15 +221,17 @@ fn lower_envelope(run: &[u16], envelope: &mut [Parabola]) -> usize {
         let mut apart = 2 * (x - u32::from(last.apex));
         while top > 0 && last.base + u32::from(last.from) * apart > base {
             top -= 1;
-            last = envelope[top];
+            last = envelope.get(top).copied().unwrap_or_default();
             apart = 2 * (x - u32::from(last.apex));
         }
         // The last position at which the one before is not above this one.
-        let before = base.saturating_sub(last.base) / apart;
+        let before = base.saturating_sub(last.base).checked_div(apart).unwrap_or(0);
         if before < run.len() as u32 {
             top += 1;
             last = Parabola { apex: x as u16, from: before as u16 + 1, base };
-            envelope[top] = last;
+            if let Some(place) = envelope.get_mut(top) {
+                *place = last;
+            }
         }
     }
     top
@@ -255,8 +262,8 @@ fn root(square: u32) -> u16 {
         return root;
     }
     let k = (u32::BITS - SMALL.ilog2() - square.leading_zeros()).div_ceil(2);
-    let guess = u32::from(ROOTS[(square >> (2 * k)) as usize] + 1) << k;
+    let guess = ROOTS.get((square >> (2 * k)) as usize).map_or(1, |root| u32::from(root + 1)) << k;
     let square = UNIT * square;
-    let root = (guess + square / guess) / 2;
+    let root = (guess + square.checked_div(guess).unwrap_or(0)) / 2;
     (root - u32::from(root * root > square)) as u16
 }

@@ -112,7 +112,18 @@ impl Graph<'_> {
 
     /// The node that owns a pixel.
     pub fn node_at(&self, pixel: Pixel) -> Option<u16> {
-        self.member_at(pixel).map(|i| self.members[i].node)
+        self.member_at(pixel).and_then(|i| self.node_of(i))
+    }
+
+    /// The node of a member.
+    fn node_of(&self, i: usize) -> Option<u16> {
+        self.members.get(i).map(|member| member.node)
+    }
+
+    fn set_node(&mut self, i: usize, node: u16) {
+        if let Some(member) = self.members.get_mut(i) {
+            member.node = node;
+        }
     }
 
     fn member_at(&self, pixel: Pixel) -> Option<usize> {
@@ -146,7 +157,7 @@ impl Graph<'_> {
     /// pixels already joined goes round a hole inside the node and is an edge of its own.
     fn join_junctions(&mut self, skeleton: &Bitmap<'_>) -> Result<(), CapacityError> {
         for i in 0..self.members.len() {
-            let pixel = self.members[i].pixel;
+            let Some(&Member { pixel, .. }) = self.members.get(i) else { break };
             let links = links(skeleton, pixel);
             if links.count_ones() < 3 {
                 continue;
@@ -157,7 +168,7 @@ impl Graph<'_> {
                 }
                 let Some(j) = self.member_at(later) else { continue };
                 let (a, b) = (self.representative(i), self.representative(j));
-                self.members[a.max(b)].node = a.min(b) as u16;
+                self.set_node(a.max(b), a.min(b) as u16);
                 if a == b {
                     let start = self.path.len();
                     push(self.path, pixel, "path pixels")?;
@@ -170,21 +181,20 @@ impl Graph<'_> {
     }
 
     fn representative(&mut self, mut i: usize) -> usize {
-        loop {
-            let parent = self.members[i].node as usize;
-            if parent == i {
-                return i;
-            }
-            let grandparent = self.members[parent].node;
-            self.members[i].node = grandparent;
-            i = grandparent as usize;
+        while let Some(parent) = self.node_of(i).map(usize::from)
+            && parent != i
+            && let Some(grandparent) = self.node_of(parent)
+        {
+            self.set_node(i, grandparent);
+            i = grandparent.into();
         }
+        i
     }
 
     /// Make a node of each representative, and let members and edges name nodes instead of members.
     fn number_nodes(&mut self, skeleton: &Bitmap<'_>) -> Result<(), CapacityError> {
         for i in 0..self.members.len() {
-            let Member { pixel, node: parent } = self.members[i];
+            let Some(&Member { pixel, node: parent }) = self.members.get(i) else { break };
             // A representative comes before all that it represents, so its node is known by now.
             let node = if parent as usize == i {
                 let kind = match link_count(skeleton, pixel) {
@@ -195,22 +205,23 @@ impl Graph<'_> {
                 let sum = PixelPoint { u: pixel.u as i32, v: pixel.v as i32 };
                 self.push_node(kind, sum)?
             } else {
-                let node = self.members[parent as usize].node;
-                let owner = &mut self.nodes[node as usize];
-                // At most 65535 pixels below column and row 4096: the sums stay below 2^28.
-                owner.position.u += pixel.u as i32;
-                owner.position.v += pixel.v as i32;
-                owner.pixels += 1;
+                let node = self.node_of(parent.into()).unwrap_or_default();
+                if let Some(owner) = self.nodes.get_mut(usize::from(node)) {
+                    // At most 65535 pixels below column and row 4096: the sums stay below 2^28.
+                    owner.position.u += pixel.u as i32;
+                    owner.position.v += pixel.v as i32;
+                    owner.pixels += 1;
+                }
                 node
             };
-            self.members[i].node = node;
+            self.set_node(i, node);
         }
         for node in self.nodes.iter_mut() {
             let mean = |sum: i32| div_round(sum as i64 * PX as i64, node.pixels as i64) as i32;
             node.position = PixelPoint { u: mean(node.position.u), v: mean(node.position.v) };
         }
         for edge in self.edges.iter_mut() {
-            edge.nodes = edge.nodes.map(|i| self.members[i as usize].node);
+            edge.nodes = edge.nodes.map(|i| self.members.get(usize::from(i)).map_or(i, |member| member.node));
         }
         Ok(())
     }
@@ -218,7 +229,7 @@ impl Graph<'_> {
     /// Walk from every node along every link that no walk has come back on.
     fn follow_edges(&mut self, skeleton: &Bitmap<'_>, seen: &mut Bitmap<'_>) -> Result<(), CapacityError> {
         for i in 0..self.members.len() {
-            let Member { pixel, node } = self.members[i];
+            let Some(&Member { pixel, node }) = self.members.get(i) else { break };
             for next in Linked(pixel, links(skeleton, pixel)) {
                 let fresh = match self.node_at(next) {
                     Some(other) => other != node && (pixel.v, pixel.u) < (next.v, next.u),
@@ -294,8 +305,9 @@ pub fn trace(skeleton: &Bitmap<'_>, seen: &mut [Word], graph: &mut Graph<'_>) ->
     graph.follow_loops(skeleton, &mut seen)?;
     for edge in graph.edges.iter() {
         for node in edge.nodes {
-            let degree = &mut graph.nodes[node as usize].degree;
-            *degree = degree.saturating_add(1);
+            if let Some(node) = graph.nodes.get_mut(usize::from(node)) {
+                node.degree = node.degree.saturating_add(1);
+            }
         }
     }
     Ok(())

@@ -19,6 +19,7 @@ use crate::bitmap::Bitmap;
 use crate::fixed::PX;
 use crate::limits::{CapacityError, MAX_SIDE};
 use crate::point::{PixelPoint, orient};
+use core::mem::swap;
 use heapless::VecView;
 
 /// The outermost points of a row, 1/256 px. Rows between those of pixels are welcome.
@@ -60,11 +61,15 @@ pub fn convex_hull(
     let (mut right, mut left) = (0, 0);
     for extent in extents {
         let end = point(extent.right, extent.v);
-        while right >= 2 && orient(points[right - 2], points[right - 1], end) <= 0 {
+        while let Some([.., before, last]) = points.get(..right)
+            && orient(*before, *last, end) <= 0
+        {
             right -= 1;
         }
         let start = point(extent.left, extent.v);
-        while left >= 2 && orient(points[limit - left + 1], points[limit - left], start) >= 0 {
+        while let Some([last, before, ..]) = points.get(limit - left..)
+            && orient(*before, *last, start) >= 0
+        {
             left -= 1;
         }
         if right + left + 2 > limit {
@@ -72,8 +77,11 @@ pub fn convex_hull(
             return Err(overflow);
         }
         (right, left) = (right + 1, left + 1);
-        points[right - 1] = end;
-        points[limit - left] = start;
+        for (place, point) in [(right - 1, end), (limit - left, start)] {
+            if let Some(place) = points.get_mut(place) {
+                *place = point;
+            }
+        }
     }
     let length = join(points, right, left);
     out.truncate(length);
@@ -86,15 +94,23 @@ fn join(points: &mut [PixelPoint], right: usize, left: usize) -> usize {
         return 0;
     }
     let mut bottom_up = points.len() - left;
-    if points[right - 1] == points[bottom_up] {
+    if points.get(right - 1) == points.get(bottom_up) {
         bottom_up += 1;
     }
-    points.copy_within(bottom_up.., right);
-    let mut length = right + points.len() - bottom_up;
-    if length > 1 && points[length - 1] == points[0] {
-        length -= 1;
-    } else {
-        points[..length].rotate_right(1);
+    let mut length = right;
+    while let Some(&point) = points.get(bottom_up)
+        && let Some(place) = points.get_mut(length)
+    {
+        *place = point;
+        (length, bottom_up) = (length + 1, bottom_up + 1);
+    }
+    if length > 1 && points.get(length - 1) == points.first() {
+        return length - 1;
+    }
+    // The last one comes first.
+    let chain = points.get_mut(..length).unwrap_or_default();
+    if let Some(mut before) = chain.last().copied() {
+        chain.iter_mut().for_each(|point| swap(point, &mut before));
     }
     length
 }

@@ -13,6 +13,7 @@
 
 use crate::fixed::{ONE, PX, log2};
 use crate::point::{PixelPoint, orient};
+use core::num::{NonZeroU64, NonZeroUsize};
 
 /// How ratios of areas are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,8 +27,10 @@ pub enum Measure {
 /// How far a vertex may be off, 1/256 px.
 const VERTEX_NOISE: i64 = PX as i64 / 2;
 
-/// The areas whose ratios these are.
-const PAIRS: [(usize, usize); 6] = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
+/// The pairs whose ratios these are.
+const fn pairs<T: Copy>([a, b, c, d]: [T; 4]) -> [(T, T); 6] {
+    [(a, b), (a, c), (a, d), (b, c), (b, d), (c, d)]
+}
 
 /// The six ratios I12, I13, I14, I23, I24, I34 of a quadruplet, 1/65536.
 pub type FeatureVector = [i32; 6];
@@ -36,24 +39,18 @@ pub type FeatureVector = [i32; 6];
 ///
 /// All zero for a polygon without vertices.
 pub fn feature_vector(polygon: &[PixelPoint], i: usize, measure: Measure) -> FeatureVector {
-    let n = polygon.len();
-    if n == 0 {
-        return [0; 6];
-    }
-    let [a, b, c, d] = [0, 1, 2, 3].map(|k| polygon[(i + k) % n]);
-    let areas =
-        [orient(a, b, c), orient(a, b, d), orient(a, c, d), orient(b, c, d)].map(|s| s.unsigned_abs().max(1));
+    let Some(n) = NonZeroUsize::new(polygon.len()) else { return [0; 6] };
+    let [a, b, c, d] = [0, 1, 2, 3].map(|k| polygon.get((i + k) % n).copied().unwrap_or_default());
+    let areas = [orient(a, b, c), orient(a, b, d), orient(a, c, d), orient(b, c, d)]
+        .map(|s| NonZeroU64::new(s.unsigned_abs()).unwrap_or(NonZeroU64::MIN));
     match measure {
-        Measure::Ratio => PAIRS.map(|(k, l)| {
-            // Areas below 2^44, so the shift stays below 2^60.
-            let ratio = (areas[k] << 16) / areas[l];
-            ratio.clamp(1 << 8, 1 << 24) as i32
-        }),
+        // Areas below 2^44, so the shift stays below 2^60.
+        Measure::Ratio => pairs(areas).map(|(k, l)| ((k.get() << 16) / l).clamp(1 << 8, 1 << 24) as i32),
         Measure::Logarithm => {
             let chord = a.distance(c).max(b.distance(d)).max(a.distance(d));
             let noise = (i64::from(chord) * VERTEX_NOISE) as u64;
-            let logarithms = areas.map(|s| log2(s + noise));
-            PAIRS.map(|(k, l)| (logarithms[k] - logarithms[l]).clamp(-8 * ONE, 8 * ONE))
+            let logarithms = areas.map(|s| log2(s.get() + noise));
+            pairs(logarithms).map(|(k, l)| (k - l).clamp(-8 * ONE, 8 * ONE))
         }
     }
 }

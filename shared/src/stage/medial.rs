@@ -168,7 +168,7 @@ fn grow(
     let squared = (u * u + v * v).cast_unsigned();
     let length = ((squared >> 14).cast_signed() + UNIT) / 2 + 1;
     let mut start = Touching { at, inward, squared, length, rho: UNLIMITED, contact: i };
-    for q in &points[near.saturating_sub(1)..points.len().min(near + 2)] {
+    for q in points.get(near.saturating_sub(1)..points.len().min(near + 2)).unwrap_or_default() {
         start.narrow(q.at);
     }
     if start.rho == UNLIMITED {
@@ -223,7 +223,8 @@ fn is_empty(
     // rho^2 (1 - x^2) + (S - 1)^2 < 2 rho (S - 2) allows for.
     if i64::from(grown.rho) * ((1 << 28) - i64::from(grown.squared)) <= i64::from(SLACK / 2) << 28 {
         let least = product(radius, radius);
-        return inside.iter().all(|&j| centre.distance_squared(points[j as usize].at) >= least);
+        let is_deep = |q: &ContourPoint| centre.distance_squared(q.at) < least;
+        return !inside.iter().any(|&j| points.get(j as usize).is_some_and(is_deep));
     }
     let mut empty = true;
     strips.walk(Disc { centre, radius }, |_, _, _| empty = false);

@@ -30,6 +30,7 @@ use crate::envelope::{ENTRY_BITS, Envelope};
 use crate::fixed::{ONE, PX, div_floor, div_round, saturate};
 use crate::limits::{CapacityError, push};
 use crate::stage::branch::{Ball, Sample};
+use core::num::NonZeroUsize;
 use heapless::VecView;
 
 /// Largest number of control points of a curve.
@@ -124,12 +125,15 @@ impl<'a> Nurbs<'a> {
 
     /// The ball at parameter `t`, 1/65536 span; at the nearest end if it is outside an open curve.
     pub fn evaluate(&self, t: i32) -> Ball {
-        let t = if self.closed { t.rem_euclid(self.end()) } else { t.clamp(0, self.end()) };
+        let end = self.end();
+        let t = if self.closed { t.checked_rem_euclid(end).unwrap_or(0) } else { t.min(end).max(0) };
         let (first, basis) = basis(span_count(self.controls.len(), self.closed), self.closed, t);
         let mut share = 0;
         let mut sums = [0; 4];
         for (k, value) in basis.into_iter().enumerate() {
-            let control = self.controls[(first + k) % self.controls.len()];
+            let (place, count) = (first + k, self.controls.len());
+            let place = if place < count { place } else { place - count };
+            let control = self.controls.get(place).copied().unwrap_or_default();
             // At most 2^30 x 2^20 / 2^16; times a coordinate below 2^54.
             let weight = (value as i64 * control.weight.clamp(1, 16 * ONE) as i64) >> 16;
             share += weight;
@@ -191,9 +195,11 @@ pub fn fit(
     let line = Polyline::new(samples, closed);
     if !closed && (samples.len() < 6 || line.length < 3 << (8 + ARC_BITS)) {
         for k in 0..=DEGREE as i64 {
-            let (a, b) = (first.ball.bounded(), last.ball.bounded());
-            let part = |c: usize| (a[c] + div_round((b[c] - a[c]) * k, DEGREE as i64)) as i32;
-            let ball = Ball::from_channels([0, 1, 2, 3].map(part));
+            let mut channels = first.ball.bounded();
+            for (channel, end) in channels.iter_mut().zip(last.ball.bounded()) {
+                *channel += div_round((end - *channel) * k, DEGREE as i64);
+            }
+            let ball = Ball::from_channels(channels.map(|channel| channel as i32));
             push(controls, Control { ball, weight: ONE }, "control points")?;
         }
         return Ok(DEGREE + 1);
@@ -207,8 +213,12 @@ pub fn fit(
     let origin = first.ball.bounded();
     accumulate(&line, params, origin, &mut Envelope::new(count, closed, entries)?, sides);
     for side in sides.iter() {
-        let unknowns = [0, 1, 2, 3].map(|c| saturate(origin[c] + div_round(side[c], 1 << SIDE_BITS)));
-        push(controls, Control { ball: Ball::from_channels(unknowns), weight: ONE }, "control points")?;
+        let mut channels = origin;
+        for (channel, unknown) in channels.iter_mut().zip(side) {
+            *channel += div_round(*unknown, 1 << SIDE_BITS);
+        }
+        let ball = Ball::from_channels(channels.map(saturate));
+        push(controls, Control { ball, weight: ONE }, "control points")?;
     }
     Ok(count)
 }
@@ -229,7 +239,7 @@ fn accumulate(
     // The diagonal holds at most the samples of a span (basis functions integrate to a span), an end,
     // and 1 + 4 + 1 of the penalty; divided by this power of two it stays below 1.
     let largest = pieces / spans as i64 + 4 + end_weight + 6 * smoothing / ONE as i64 + 6;
-    let bits = largest.ilog2() + 1;
+    let bits = largest.checked_ilog2().unwrap_or(0) + 1;
 
     // Bits between a product of basis function and channel, and a right side.
     let drop = BASIS_BITS + FINE_BITS + bits - SIDE_BITS;
@@ -290,13 +300,14 @@ struct Span {
 
 impl Span {
     fn give(&self, matrix: &mut Envelope<'_>, sides: &mut [[i64; 4]]) {
+        let Some(count) = NonZeroUsize::new(sides.len()) else { return };
         let mut entries = self.entries.iter();
-        for a in 0..=DEGREE {
-            let row = (self.first + a) % sides.len();
+        for (a, sums) in self.sides.iter().enumerate() {
+            let row = (self.first + a) % count;
             for (b, entry) in (0..=a).zip(&mut entries) {
-                matrix.add(row, (self.first + b) % sides.len(), *entry);
+                matrix.add(row, (self.first + b) % count, *entry);
             }
-            for (side, sum) in sides[row].iter_mut().zip(self.sides[a]) {
+            for (side, sum) in sides.get_mut(row).into_iter().flatten().zip(sums) {
                 *side += sum;
             }
         }
@@ -311,10 +322,10 @@ const fn span_count(controls: usize, closed: bool) -> usize {
 /// The four basis functions that are not 0 at `t` (1/65536 span), in 1/2^30, and the index of the first
 /// (Cox and de Boor; The NURBS Book, A2.2). They add up to exactly 1.
 fn basis(spans: usize, closed: bool, t: i32) -> (usize, [i32; 4]) {
-    let span = (t >> 16).clamp(0, spans as i32 - 1);
+    let span = (t >> 16).min(spans as i32 - 1).max(0);
     let knot = |offset: i32| {
         let knot = span + offset;
-        if closed { knot } else { knot.clamp(0, spans as i32) }
+        if closed { knot } else { knot.min(spans as i32).max(0) }
     };
     let mut values = [1 << BASIS_BITS, 0, 0, 0];
     for degree in 1..=DEGREE {
@@ -325,7 +336,7 @@ fn basis(spans: usize, closed: bool, t: i32) -> (usize, [i32; 4]) {
             // value (t - left) / (right - left), rounded: the shift leaves 32 bits, since the function is at most
             // 2^30 and t at most 1 to 3 spans from the left.
             let part = *value as u64 * (t - (left << 16)) as u64 + (u64::from(spans) << 15);
-            let rising = ((part >> 16) as u32 / spans).cast_signed();
+            let rising = ((part >> 16) as u32).checked_div(spans).unwrap_or(0).cast_signed();
             *value += carried - rising;
             carried = rising;
         }
@@ -396,8 +407,10 @@ impl<'a> Polyline<'a> {
         let beyond = (arc - cursor.start).min(across);
         let (a, b) = self.ends(cursor.segment);
         let between = |a: i64, b: i64| a + div_round((b - a) * beyond, across);
-        let (p, q) = (a.ball.bounded(), b.ball.bounded());
-        let channels = [0, 1, 2, 3].map(|c| between(p[c] << FINE_BITS, q[c] << FINE_BITS));
+        let mut channels = a.ball.bounded();
+        for (channel, end) in channels.iter_mut().zip(b.ball.bounded()) {
+            *channel = between(*channel << FINE_BITS, end << FINE_BITS);
+        }
         let weight = |s: Sample| s.weight.clamp(ONE / 64, ONE) as i64;
         (channels, between(weight(a), weight(b)))
     }

@@ -78,19 +78,17 @@ pub fn thin_in_lanes<L: Lanes>(
 ) -> Result<Report, CapacityError> {
     let scratch = scratch.take(scratch_words(bitmap.size()), "words of scratch")?;
     let Some(cut) = Cut::of(bitmap) else { return Ok(Report::default()) };
-    let (mut now, rest) = scratch[..cut.words()].split_at_mut(cut.count * cut.stride());
-    let (mut next, marks) = rest.split_at_mut(cut.count * cut.stride());
-    let (due, found) = marks.split_at_mut(MAX_STEPS * cut.count);
+    let Some([mut now, mut next, due, found]) = cut.parts(scratch) else { return Ok(Report::default()) };
     let before = bitmap.count();
     cut.read(bitmap, now);
-    next.copy_from_slice(now);
+    next.iter_mut().zip(&*now).for_each(|(to, from)| *to = *from);
     due.fill(cut.all_blocks());
     let mut cycles = 0;
     let mut busy = true;
     while busy {
         busy = false;
         for step in 0..rule.steps() {
-            let due_now = &mut due[step * cut.count..][..cut.count];
+            let due_now = due.get_mut(step * cut.count..(step + 1) * cut.count).unwrap_or_default();
             busy |= match (rule, step) {
                 (Parallel::ZhangSuen, 0) => cut.sweep::<L, ZhangSuen<true>>(now, next, due_now, found),
                 (Parallel::ZhangSuen, _) => cut.sweep::<L, ZhangSuen<false>>(now, next, due_now, found),
@@ -185,6 +183,15 @@ impl Cut {
         self.count * (2 * self.stride() + MAX_STEPS + MARKS)
     }
 
+    /// The strips before and after a step, the blocks due at each step, and the marks.
+    fn parts<'s>(&self, scratch: &'s mut [Word]) -> Option<[&'s mut [Word]; 4]> {
+        let all = self.count * self.stride();
+        let (now, rest) = scratch.get_mut(..self.words())?.split_at_mut_checked(all)?;
+        let (next, marks) = rest.split_at_mut_checked(all)?;
+        let (due, found) = marks.split_at_mut_checked(MAX_STEPS * self.count)?;
+        Some([now, next, due, found])
+    }
+
     /// Marks of all blocks of a strip.
     const fn all_blocks(&self) -> Word {
         Word::MAX >> (WORD_BITS - self.blocks)
@@ -201,7 +208,9 @@ impl Cut {
             for (c, strip) in rows.chunks_exact_mut(self.stride()).enumerate() {
                 let (i, bit) = self.place(c);
                 let from = at(row, i) >> bit | at(row, i + 1) << 1 << (WORD_BITS - 1 - bit);
-                strip[1 + v] = from << 1 | before;
+                if let Some(word) = strip.get_mut(1 + v) {
+                    *word = from << 1 | before;
+                }
                 before = from >> (PITCH - 1) & 1;
             }
         }
@@ -215,12 +224,14 @@ impl Cut {
             row.fill(0);
             for (c, strip) in rows.chunks_exact(self.stride()).enumerate() {
                 let (i, bit) = self.place(c);
-                let own = (strip[1 + v] & OWN) >> 1;
+                let own = (at(strip, 1 + v) & OWN) >> 1;
                 // Of most words nothing is left.
                 if own == 0 {
                     continue;
                 }
-                row[i] |= own << bit;
+                if let Some(word) = row.get_mut(i) {
+                    *word |= own << bit;
+                }
                 if let Some(next) = row.get_mut(i + 1) {
                     *next |= own >> 1 >> (WORD_BITS - 1 - bit);
                 }
@@ -249,7 +260,11 @@ impl Cut {
             let mut marks = [0; MARKS];
             for block in SetBits(core::mem::take(due)) {
                 let (from, rows) = (block * self.block(), self.block());
-                let (now, next) = (&now[from..from + rows + 2], &mut next[from + 1..from + 1 + rows]);
+                let (Some(now), Some(next)) =
+                    (now.get(from..from + rows + 2), next.get_mut(from + 1..from + 1 + rows))
+                else {
+                    continue;
+                };
                 let [first, here, last, west, east] = delete::<L, S>(now, next);
                 marks[0] |= first << block >> 1 | here << block | last << block << 1;
                 marks[1] |= west << block;
@@ -271,31 +286,37 @@ impl Cut {
                 continue;
             }
             let beside = |marks: Word| (marks | marks >> 1 | marks << 1) & all;
-            for due in due.chunks_exact_mut(self.count).take(steps) {
-                due[c] |= near & all;
-                if west != 0 && c > 0 {
-                    due[c - 1] |= beside(west);
+            for due in due.chunks_exact_mut(self.count.max(1)).take(steps) {
+                let mut look = |c: usize, blocks: Word| {
+                    if let Some(due) = due.get_mut(c) {
+                        *due |= blocks;
+                    }
+                };
+                look(c, near & all);
+                if west != 0 {
+                    look(c.wrapping_sub(1), beside(west));
                 }
-                if east != 0 && c + 1 < self.count {
-                    due[c + 1] |= beside(east);
+                if east != 0 {
+                    look(c + 1, beside(east));
                 }
             }
-            if c > 0 {
-                let [to, from] = self.strips(rows, c - 1);
+            if west != 0
+                && let Some((to, from)) = c.checked_sub(1).and_then(|c| self.strips(rows, c))
+            {
                 self.copy(from, west, to, |own| own << PITCH | !(1 << (WORD_BITS - 1)));
             }
-            if c + 1 < self.count {
-                let [from, to] = self.strips(rows, c);
+            if east != 0
+                && let Some((from, to)) = self.strips(rows, c)
+            {
                 self.copy(from, east, to, |own| own >> PITCH | !1);
             }
         }
     }
 
-    /// A strip and the one after it.
+    /// A strip and the one after it, if there is one.
     #[inline(always)]
-    fn strips<'r>(&self, rows: &'r mut [Word], c: usize) -> [&'r mut [Word]; 2] {
-        let (one, other) = rows[c * self.stride()..(c + 2) * self.stride()].split_at_mut(self.stride());
-        [one, other]
+    fn strips<'r>(&self, rows: &'r mut [Word], c: usize) -> Option<(&'r mut [Word], &'r mut [Word])> {
+        rows.get_mut(c * self.stride()..(c + 2) * self.stride())?.split_at_mut_checked(self.stride())
     }
 
     /// Clear in strip `to` what is clear in the marked blocks of strip `from`, of which `seen` makes a mask.
@@ -303,7 +324,8 @@ impl Cut {
     fn copy(&self, from: &[Word], marks: Word, to: &mut [Word], seen: impl Fn(Word) -> Word) {
         for block in SetBits(marks) {
             let rows = 1 + block * self.block()..1 + (block + 1) * self.block();
-            for (to, from) in to[rows.clone()].iter_mut().zip(&from[rows]) {
+            let to = to.get_mut(rows.clone()).unwrap_or_default();
+            for (to, from) in to.iter_mut().zip(from.get(rows).unwrap_or_default()) {
                 *to &= seen(*from);
             }
         }
@@ -314,11 +336,20 @@ impl Cut {
 /// anything in the first row, anywhere, in the last row, in the first column and in the last one.
 #[inline(always)]
 fn delete<L: Lanes, S: Step>(now: &[Word], next: &mut [Word]) -> [Word; 5] {
-    let first = delete_at::<L, S>(now, next, 0);
+    // As long as `next`, so that nobody has to look whether a row is there.
+    let Some(below) = now.get(2..2 + next.len()) else { return [0; 5] };
+    // Of single words, two have been loaded for the rows before.
+    let rows = |v: usize, passed: [L; 2]| {
+        let [n, c] = if L::WORDS == 1 { passed } else { [L::load(now, v), L::load(now, v + 1)] };
+        [n, c, L::load(below, v)]
+    };
+    let mut three = rows(0, [L::load(now, 0), L::load(now, 1)]);
+    let first = delete_at::<L, S>(three, next, 0);
     let [mut all, mut last] = [first; 2];
     let mut v = L::WORDS;
     while v < next.len() {
-        last = delete_at::<L, S>(now, next, v);
+        three = rows(v, [three[1], three[2]]);
+        last = delete_at::<L, S>(three, next, v);
         all = all | last;
         v += L::WORDS;
     }
@@ -328,10 +359,9 @@ fn delete<L: Lanes, S: Step>(now: &[Word], next: &mut [Word]) -> [Word; 5] {
     [first, here, last, west, east]
 }
 
-/// [`delete`] in the rows of one register, `v` of `next` and those after it: what was found.
+/// [`delete`] in the rows of one register, between those above and below, from `v` of `next` on: what was found.
 #[inline(always)]
-fn delete_at<L: Lanes, S: Step>(now: &[Word], next: &mut [Word], v: usize) -> L {
-    let (n, c, s) = (L::load(now, v), L::load(now, v + 1), L::load(now, v + 2));
+fn delete_at<L: Lanes, S: Step>([n, c, s]: [L; 3], next: &mut [Word], v: usize) -> L {
     let found = c & L::splat(OWN) & S::finds([n, n >> 1, c >> 1, s >> 1, s, s << 1, c << 1, n << 1]);
     (c & !found).store(next, v);
     found

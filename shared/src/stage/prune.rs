@@ -113,8 +113,8 @@ pub fn prune(
         };
         let before = report.branches_removed;
         while report.branches_removed - before < quota {
-            let Some(least) = least(&tips).filter(|&i| tips[i].score < threshold) else { break };
-            let tip = tips.swap_remove(least);
+            let least = least(&tips).filter(|(_, score)| *score < threshold);
+            let Some(tip) = least.and_then(|(i, _)| tips.swap_remove(i)) else { break };
             report.pixels_removed += erase(skeleton, tip);
             report.branches_removed += 1;
             if link_count(skeleton, tip.junction) == 2 {
@@ -129,9 +129,10 @@ pub fn prune(
     }
 }
 
-fn least(tips: &[Tip]) -> Option<usize> {
-    let key = |&i: &usize| (tips[i].score, tips[i].pixel.v, tips[i].pixel.u);
-    (0..tips.len()).min_by_key(key)
+/// The place and the score of the tip that goes first.
+fn least(tips: &[Tip]) -> Option<(usize, i64)> {
+    let least = tips.iter().enumerate().min_by_key(|(_, tip)| (tip.score, tip.pixel.v, tip.pixel.u));
+    least.map(|(i, tip)| (i, tip.score))
 }
 
 /// Clear a branch but for its junction pixel; the number of pixels cleared.
@@ -158,15 +159,15 @@ fn rescore(
     tips: &mut List<'_, Tip>,
 ) {
     let mut i = 0;
-    while i < tips.len() {
-        if tips[i].junction != former {
-            i += 1;
-        } else if let Some(tip) = score(skeleton, distance, rule, tips[i].pixel) {
-            tips[i] = tip;
-            i += 1;
-        } else {
-            tips.swap_remove(i);
+    while let Some(tip) = tips.get_mut(i) {
+        if tip.junction == former {
+            let Some(scored) = score(skeleton, distance, rule, tip.pixel) else {
+                tips.swap_remove(i);
+                continue;
+            };
+            *tip = scored;
         }
+        i += 1;
     }
 }
 

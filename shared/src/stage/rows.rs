@@ -22,6 +22,8 @@ use crate::point::{Direction, PixelPoint};
 use crate::stage::contour::{ContourLoop, ContourPoint};
 use crate::stage::plane::ImagePlane;
 use bytemuck::{Pod, Zeroable};
+use core::mem::swap;
+use core::num::NonZeroUsize;
 use heapless::VecView;
 
 /// Where a contour crosses the middle of a row.
@@ -115,13 +117,19 @@ pub fn row_crossings<'a>(
 ) -> Rows<'a> {
     first.fill(0);
     let rows = first.len().saturating_sub(1);
-    each_crossing(points, loops, offset, rows, |_, _, v| first[v as usize + 1] += 1);
-    for v in 0..rows {
-        first[v + 1] += first[v];
+    each_crossing(points, loops, offset, rows, |_, _, v| {
+        if let Some(count) = first.get_mut(v as usize + 1) {
+            *count += 1;
+        }
+    });
+    let mut before = 0;
+    for entry in first.iter_mut() {
+        before += *entry;
+        *entry = before;
     }
     // Counting sort in place: `first` moves to each row's end while its crossings arrive, and back.
     each_crossing(points, loops, offset, rows, |i, [a, b], v| {
-        let slot = &mut first[v as usize];
+        let Some(slot) = first.get_mut(v as usize) else { return };
         if let Some(place) = crossings.get_mut(*slot as usize) {
             let (run, rise) = (v * PX + offset - a.v, b.v - a.v);
             let u = a.u + div_round(i64::from(b.u - a.u) * i64::from(run), rise.into()) as i32;
@@ -129,18 +137,32 @@ pub fn row_crossings<'a>(
         }
         *slot += 1;
     });
-    for v in (0..rows).rev() {
-        first[v + 1] = first[v];
-    }
-    if let Some(zeroth) = first.first_mut() {
-        *zeroth = 0;
-    }
-    for v in 0..rows {
-        if let Some(row) = crossings.get_mut(first[v] as usize..first[v + 1] as usize) {
-            row.sort_unstable_by_key(|c| (c.u, c.index));
+    let mut before = 0;
+    first.iter_mut().for_each(|entry| swap(entry, &mut before));
+    for (from, to) in first.iter().zip(first.iter().skip(1)) {
+        if let Some(row) = crossings.get_mut(*from as usize..*to as usize) {
+            sort(row);
         }
     }
     Rows { first, crossings }
+}
+
+/// Sort crossings by column: Shell's way, which takes no stack, unlike the library's.
+fn sort(row: &mut [RowCrossing]) {
+    let mut gap = row.len();
+    while gap > 1 {
+        gap = if gap == 2 { 1 } else { gap * 5 / 11 };
+        for end in gap..row.len() {
+            let mut high = end;
+            while let Some(low) = high.checked_sub(gap)
+                && let Some([before, .., after]) = row.get_mut(low..=high)
+                && (before.u, before.index) > (after.u, after.index)
+            {
+                swap(before, after);
+                high = low;
+            }
+        }
+    }
 }
 
 /// Walk along the loops and report where they cross a row: the number of the point before, it and the next
@@ -153,8 +175,7 @@ fn each_crossing(
     mut report: impl FnMut(usize, [PixelPoint; 2], i32),
 ) {
     for l in loops {
-        for i in l.range() {
-            let (a, b) = (points[i].at, points[l.step(i, 1)].at);
+        let mut segment = |i: usize, a: PixelPoint, b: PixelPoint| {
             let (low, high) = (a.v.min(b.v) - offset, a.v.max(b.v) - offset);
             // The lower end belongs to the segment, the upper one to the next: each row once.
             let from = low.div_euclid(PX) + i32::from(low.rem_euclid(PX) != 0);
@@ -162,6 +183,13 @@ fn each_crossing(
             for v in from.max(0)..to.min(rows as i32) {
                 report(i, [a, b], v);
             }
+        };
+        let own = points.get(l.range()).unwrap_or_default();
+        for (i, ends) in l.range().zip(own.windows(2)) {
+            segment(i, ends[0].at, ends[1].at);
+        }
+        if let (Some(last), Some(first)) = (own.last(), own.first()) {
+            segment(l.start + own.len() - 1, last.at, first.at);
         }
     }
 }
@@ -223,23 +251,26 @@ pub fn match_rows(
     let skip = skip_cost(left_points);
     let mut steps = [[Step::SkipRight; ROW_CROSSINGS + 1]; ROW_CROSSINGS + 1];
     let mut statistics = RowStatistics::default();
+    let on_border = |points: &[ContourPoint], c: &RowCrossing| {
+        points.get(c.index as usize).is_some_and(|point| point.border)
+    };
     for v in 0..left.len() {
-        let (a, b) = (left.matched(v), right.matched(v));
         let mut known = 0;
-        align((a, b), plane, skip, &mut steps, |i, j| {
-            known += u32::from(!left_points[a[i].index as usize].border);
-            record(&a[i], &b[j], left_points, right_points, matches);
+        align((left.matched(v), right.matched(v)), plane, skip, &mut steps, |x, y| {
+            known += u32::from(!on_border(left_points, x));
+            record(x, y, left_points, right_points, matches);
         });
         // Where either image ends, a missing partner says nothing.
-        let edges = left.row(v).iter().filter(|c| !left_points[c.index as usize].border).count() as u32;
-        let cut_off = right.row(v).iter().filter(|c| right_points[c.index as usize].border).count() as u32;
+        let edges = left.row(v).iter().filter(|c| !on_border(left_points, c)).count() as u32;
+        let cut_off = right.row(v).iter().filter(|c| on_border(right_points, c)).count() as u32;
         statistics.crossings += edges;
         statistics.unmatched += (edges - known).saturating_sub(cut_off);
     }
     for l in left_loops {
         let mut trusted = scratch.fork().list("contour matches");
-        for i in l.range().filter(|&i| matches[i].weight > 0) {
-            let (p, m) = (&left_points[i], &matches[i]);
+        let points = left_points.get(l.range()).unwrap_or_default();
+        let found = matches.get(l.range()).unwrap_or_default();
+        for ((i, p), m) in l.range().zip(points).zip(found).filter(|(_, m)| m.weight > 0) {
             let turn = p.normal.cross(m.normal_right).clamp(-MAX_TURN, MAX_TURN);
             let excess = m.disparity - plane.at(p.at);
             trusted.push(Trusted { index: i as u32, excess, turn, weight: m.weight.into() })?;
@@ -276,7 +307,7 @@ fn align(
     plane: &ImagePlane,
     skip: i32,
     steps: &mut Steps,
-    mut pair: impl FnMut(usize, usize),
+    mut pair: impl FnMut(&RowCrossing, &RowCrossing),
 ) {
     let mut cost = [0i32; ROW_CROSSINGS + 1];
     for (j, c) in cost.iter_mut().enumerate().take(b.len() + 1) {
@@ -304,7 +335,9 @@ fn align(
         match steps[i][j] {
             Step::Pair => {
                 (i, j) = (i - 1, j - 1);
-                pair(i, j);
+                if let (Some(x), Some(y)) = (a.get(i), b.get(j)) {
+                    pair(x, y);
+                }
             }
             Step::SkipLeft => i -= 1,
             Step::SkipRight => j -= 1,
@@ -320,9 +353,9 @@ fn record(
     right: &[ContourPoint],
     matches: &mut [ContourMatch],
 ) {
-    let (p, q) = (&left[x.index as usize], &right[y.index as usize]);
+    let (k, l) = (x.index as usize, y.index as usize);
+    let (Some(p), Some(q), Some(here)) = (left.get(k), right.get(l), matches.get_mut(k)) else { return };
     let flatter = i32::from(p.normal.u).abs().min(i32::from(q.normal.u).abs());
-    let here = &mut matches[x.index as usize];
     let weight = ((flatter * flatter) >> 14) as u16;
     if flatter >= MIN_NX && !p.border && !q.border && weight > here.weight {
         *here = ContourMatch { disparity: x.u - y.u, weight, normal_right: q.normal };
@@ -332,17 +365,20 @@ fn record(
 /// Clear the weight of matches that differ from the running median along the loop.
 fn reject_outliers(trusted: &mut List<'_, Trusted>) {
     let n = trusted.len();
-    if n > 2 * MEDIAN_REACH {
+    if let Some(around) = NonZeroUsize::new(n).filter(|_| n > 2 * MEDIAN_REACH) {
+        let excess = |trusted: &[Trusted], k: usize| trusted.get(k % around).map_or(0, |t| t.excess);
         // The window around match 0, sorted; with each step one leaves it and one enters.
-        let mut window = core::array::from_fn(|w| trusted[(n + w - MEDIAN_REACH) % n].excess);
+        let mut window = core::array::from_fn(|w| excess(trusted, n + w - MEDIAN_REACH));
         window.sort_unstable();
         for k in 0..n {
             // Only the weight changes here, so that every median sees the same neighbours.
-            if (trusted[k].excess - window[MEDIAN_REACH]).abs() > OUTLIER {
-                trusted[k].weight = 0;
+            if let Some(here) = trusted.get_mut(k)
+                && (here.excess - window[MEDIAN_REACH]).abs() > OUTLIER
+            {
+                here.weight = 0;
             }
-            let (leaves, enters) = ((k + n - MEDIAN_REACH) % n, (k + 1 + MEDIAN_REACH) % n);
-            replace(&mut window, trusted[leaves].excess, trusted[enters].excess);
+            let (leaves, enters) = (k + n - MEDIAN_REACH, k + 1 + MEDIAN_REACH);
+            replace(&mut window, excess(trusted, leaves), excess(trusted, enters));
         }
     }
     trusted.retain(|t| t.weight > 0);
@@ -351,25 +387,35 @@ fn reject_outliers(trusted: &mut List<'_, Trusted>) {
 /// Take a value out of a sorted window that holds it, and put another in.
 fn replace(window: &mut [i32; 2 * MEDIAN_REACH + 1], old: i32, new: i32) {
     let mut place = window.iter().position(|w| *w == old).unwrap_or(0);
-    while place + 1 < window.len() && window[place + 1] < new {
-        window[place] = window[place + 1];
+    let put = |window: &mut [i32], place: usize, value: i32| {
+        if let Some(entry) = window.get_mut(place) {
+            *entry = value;
+        }
+    };
+    while let Some(&next) = window.get(place + 1)
+        && next < new
+    {
+        put(window, place, next);
         place += 1;
     }
-    while place > 0 && window[place - 1] > new {
-        window[place] = window[place - 1];
+    while let Some(&before) = window.get(place.wrapping_sub(1))
+        && before > new
+    {
+        put(window, place, before);
         place -= 1;
     }
-    window[place] = new;
+    put(window, place, new);
 }
 
 /// The average of match `k` and its neighbours within a few pixels of arc: (excess, turn).
 fn averaged(l: ContourLoop, trusted: &[Trusted], k: usize) -> (i32, i32) {
     let n = trusted.len();
+    let (Some(around), Some(here)) = (NonZeroUsize::new(n), trusted.get(k)) else { return (0, 0) };
     let reach = AVERAGE_REACH.min((n - 1) / 2);
     let (mut excess, mut turn, mut total) = (0i64, 0i64, 0i64);
     for w in 0..=2 * reach {
-        let t = &trusted[(k + n + w - reach) % n];
-        let ahead = (t.index as usize + l.len - trusted[k].index as usize) % l.len;
+        let Some(t) = trusted.get((k + n + w - reach) % around) else { continue };
+        let ahead = l.ahead(here.index as usize, t.index as usize);
         let apart = ahead.min(l.len - ahead);
         let weight = i64::from(t.weight) * (AVERAGE_REACH + 1).saturating_sub(apart) as i64;
         excess += weight * i64::from(t.excess);
@@ -387,21 +433,22 @@ fn fill(
     trusted: &[Trusted],
     matches: &mut [ContourMatch],
 ) {
-    let Some(last) = trusted.len().checked_sub(1) else { return };
-    let (mut from, mut behind) = (trusted[last].index as usize, averaged(l, trusted, last));
+    let Some(last) = trusted.last() else { return };
+    let (mut from, mut behind) = (last.index as usize, averaged(l, trusted, trusted.len() - 1));
     for (k, t) in trusted.iter().enumerate() {
         let ahead = averaged(l, trusted, k);
         // One trusted match alone: once around the loop back to itself.
-        let gap = match (t.index as usize + l.len - from) % l.len {
+        let gap = match l.ahead(from, t.index as usize) {
             0 => l.len,
             gap => gap,
         };
         for s in 1..=gap {
             let i = l.step(from, s as isize);
             let mix = |a: i32, b: i32| a + div_round(i64::from(b - a) * s as i64, gap as i64) as i32;
-            matches[i].disparity = plane.at(left[i].at) + mix(behind.0, ahead.0);
-            matches[i].normal_right = left[i].normal.turned(mix(behind.1, ahead.1));
-            matches[i].weight = if left[i].border { 0 } else { weight_across(matches[i].normal_right) };
+            let (Some(here), Some(point)) = (matches.get_mut(i), left.get(i)) else { continue };
+            here.disparity = plane.at(point.at) + mix(behind.0, ahead.0);
+            here.normal_right = point.normal.turned(mix(behind.1, ahead.1));
+            here.weight = if point.border { 0 } else { weight_across(here.normal_right) };
         }
         (from, behind) = (t.index as usize, ahead);
     }

@@ -11,7 +11,7 @@
 //! | cost | a counting sort of the object's pixels, one look at each, and a few at each that the first sweep leaves; [`minimal`]: words, and one look a set pixel |
 
 use crate::arena::Arena;
-use crate::bitmap::{Bitmap, Plane, SetBits, WORD_BITS};
+use crate::bitmap::{Bitmap, Plane, SetBits, WORD_BITS, at};
 use crate::limits::{CapacityError, MAX_SIDE};
 use crate::stage::distance::{DISTANCE_PX, Runs};
 use crate::stage::parallel_thinning::Report;
@@ -74,9 +74,11 @@ pub fn thin(
     loop {
         let mut kept = 0;
         for k in 0..left {
-            let entry = list[k];
+            let Some(&entry) = list.get(k) else { break };
             if entry & ANCHOR != 0 || !delete_if(bitmap, entry, |code| SIMPLE[usize::from(code)]) {
-                list[kept] = entry;
+                if let Some(place) = list.get_mut(kept) {
+                    *place = entry;
+                }
                 kept += 1;
             }
         }
@@ -86,7 +88,8 @@ pub fn thin(
         }
         left = kept;
     }
-    let thinned = list[..left].iter().filter(|&&entry| delete_if(bitmap, entry, is_removable)).count();
+    let kept = list.get(..left).unwrap_or_default();
+    let thinned = kept.iter().filter(|&&entry| delete_if(bitmap, entry, is_removable)).count();
     Ok(Report { cycles: cycles + 1, deleted: (all - left + thinned) as u32 })
 }
 
@@ -110,12 +113,17 @@ fn sort_by_distance<'o>(
     let largest = object_runs(bitmap).map(values).map(greatest).max().unwrap_or(0);
     let set = bitmap.count();
     let order = scratch.take::<u32>(scratch_order(set, largest), "entries of the thinning order")?;
-    let (list, next) = order.split_at_mut(set);
+    let (list, next) = order.split_at_mut_checked(set).unwrap_or_default();
     next.fill(0);
     for (v, run) in object_runs(bitmap) {
         let (all, values) = (run.len(), values((v, run)));
-        values.iter().for_each(|d| next[usize::from(*d)] += 1);
-        next[0] += (all - values.len()) as u32;
+        let mut count = |value: u16, pixels: usize| {
+            if let Some(entry) = next.get_mut(usize::from(value)) {
+                *entry += pixels as u32;
+            }
+        };
+        values.iter().for_each(|d| count(*d, 1));
+        count(0, all - values.len());
     }
     let mut start = 0;
     for entry in next.iter_mut() {
@@ -128,9 +136,12 @@ fn sort_by_distance<'o>(
         for u in run {
             let east = Column::of(rows, u + 1);
             let mark = if here.middle > ANCHOR_DISTANCE && is_flat(&west, &here, &east) { ANCHOR } else { 0 };
-            let place = &mut next[usize::from(here.middle)];
-            list[*place as usize] = mark | bitmap.place(u, v) as u32;
-            *place += 1;
+            if let Some(place) = next.get_mut(usize::from(here.middle))
+                && let Some(entry) = list.get_mut(*place as usize)
+            {
+                *entry = mark | bitmap.place(u, v) as u32;
+                *place += 1;
+            }
             (west, here) = (here, east);
         }
     }
@@ -185,7 +196,7 @@ pub fn minimal(bitmap: &mut Bitmap<'_>) -> u32 {
     for v in 0..size.height {
         for i in 0..size.row_words() {
             // No later pixel of the word is deleted before its turn.
-            for u in SetBits(bitmap.row(v as i32)[i]).map(|bit| i * WORD_BITS + bit) {
+            for u in SetBits(at(bitmap.row(v as i32), i)).map(|bit| i * WORD_BITS + bit) {
                 deleted += u32::from(bitmap.clear_if(bitmap.place(u, v), is_removable));
             }
         }

@@ -121,8 +121,7 @@ pub fn pack_mask<'o>(mask: &Bitmap<'_>, v: u16, out: &'o mut [u8]) -> Result<&'o
     let out = out.get_mut(..bytes).ok_or(CapacityError { what: "bytes in a frame", limit })?;
     let words = mask.row(v.into()).iter().copied().map(Word::to_le_bytes);
     for (chunk, word) in out.chunks_mut(size_of::<Word>()).zip(words) {
-        let (word, _) = word.split_at(chunk.len().min(word.len()));
-        chunk.copy_from_slice(word);
+        chunk.iter_mut().zip(word).for_each(|(to, from)| *to = from);
     }
     Ok(out)
 }

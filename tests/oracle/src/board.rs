@@ -3,7 +3,7 @@
 use assert_cmd::Command;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command as Tool, Stdio};
+use std::process::{Child, Command as Tool, ExitStatus, Stdio};
 use std::time::Duration;
 
 /// The processor of all boards.
@@ -82,6 +82,16 @@ pub fn run(machine: &str, image: &Path, arguments: &[&Path], limit: Duration) ->
         (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
     assert!(output.status.success(), "{machine}: {}\n{said}\n{complained}", output.status);
     Some(said.into_owned())
+}
+
+/// Run an image of the `mps2` boards on one of [`MACHINES`], without arguments and for `limit` at most: how it ended,
+/// which tells of faults too. Nothing where QEMU is missing.
+///
+/// # Panics
+/// When QEMU does not start.
+pub fn ending(machine: &str, image: &Path, limit: Duration) -> Option<ExitStatus> {
+    let emulator = emulator(machine, image, &[])?;
+    Some(Command::from_std(emulator).timeout(limit).output().expect("it runs").status)
 }
 
 /// A board that runs until it is dropped.

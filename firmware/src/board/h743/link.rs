@@ -57,7 +57,7 @@ fn send_usb(mut bytes: &[u8]) -> Result<(), LinkError> {
             return Err(LinkError::Closed);
         }
         if let Ok(count) = usb::OUTGOING.try_write(bytes) {
-            (bytes, moved) = (&bytes[count..], Instant::now());
+            (bytes, moved) = (bytes.get(count..).unwrap_or_default(), Instant::now());
         } else if moved.elapsed() > PATIENCE {
             return Err(LinkError::TimeLimit(PATIENCE.as_micros() as u32));
         }

@@ -87,7 +87,7 @@ pub struct Board {
 }
 
 impl Board {
-    /// Start the board; nothing when it has been started before.
+    /// Start the board; nothing when it has been started before, or when a driver refuses its settings.
     pub fn take() -> Option<Self> {
         let mut core = Peripherals::take()?;
         let p = embassy_stm32::init(clocks::configuration());
@@ -122,7 +122,7 @@ impl Board {
 
         interrupt::UART8.set_priority(Priority::P6);
         let background = BACKGROUND.start(interrupt::UART8);
-        background.spawn(usb::task(p.USB_OTG_FS, p.PA12, p.PA11).expect("spawned once"));
+        background.spawn(usb::task(p.USB_OTG_FS, p.PA12, p.PA11).ok()?);
 
         static SEND: ConstStaticCell<[u8; 4096]> = ConstStaticCell::new([0; 4096]);
         static RECEIVE: ConstStaticCell<[u8; 4096]> = ConstStaticCell::new([0; 4096]);
@@ -130,7 +130,7 @@ impl Board {
         serial.baudrate = BAUD;
         let serial =
             usart::BufferedUart::new(p.USART3, p.PD9, p.PD8, SEND.take(), RECEIVE.take(), Interrupts, serial)
-                .expect("a speed that divides the clock");
+                .ok()?;
 
         Some(Self {
             ports: Ports {

@@ -29,7 +29,7 @@ pub(super) async fn task(
     peripheral: Peri<'static, USB_OTG_FS>,
     plus: Peri<'static, PA12>,
     minus: Peri<'static, PA11>,
-) {
+) -> ! {
     let mut endpoints = [0; 4 * PACKET];
     let mut settings = usb::Config::default();
     // The board has no wire from the plug's supply to a pin of the controller.
@@ -55,7 +55,7 @@ pub(super) async fn task(
             OUTGOING.clear();
             OPEN.store(true, Ordering::Relaxed);
             while let Ok(length) = receiver.read_packet(&mut packet).await {
-                INCOMING.write_all(&packet[..length]).await;
+                INCOMING.write_all(packet.get(..length).unwrap_or_default()).await;
             }
             OPEN.store(false, Ordering::Relaxed);
         }
@@ -67,11 +67,11 @@ pub(super) async fn task(
             sender.wait_connection().await;
             loop {
                 let length = OUTGOING.read(&mut packet).await;
-                if sender.write_packet(&packet[..length]).await.is_err() {
+                if sender.write_packet(packet.get(..length).unwrap_or_default()).await.is_err() {
                     break;
                 }
             }
         }
     };
-    join3(device.run(), receive, send).await;
+    join3(device.run(), receive, send).await.0
 }

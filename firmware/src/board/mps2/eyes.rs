@@ -3,6 +3,7 @@
 //! The file has the luma of left and right picture in turn, row by row, and nothing else. What was on a picture
 //! is on it whatever exposure is ordered.
 
+use super::files::refuse;
 use super::timer::Clock;
 use crate::ports::{CameraError, CameraFault, CameraPair, Clock as _, Exposure, Identity, Side, Stamps};
 use semihosting::fs::File;
@@ -27,13 +28,12 @@ pub struct Eyes<'c> {
 }
 
 impl<'c> Eyes<'c> {
-    /// Eyes that see the first pair of the file first.
-    ///
-    /// # Panics
-    /// When the file does not hold whole pairs.
+    /// Eyes that see the first pair of the file first. The image ends when that does not hold whole pairs.
     pub fn new(file: File, clock: &'c Clock) -> Self {
-        let length = file.metadata().expect("a file with a length").len();
-        assert!(length > 0 && length.is_multiple_of(2 * PICTURE), "{length} bytes are no pairs of pictures");
+        let length = file.metadata().map_or(0, |file| file.len());
+        if length == 0 || !length.is_multiple_of(2 * PICTURE) {
+            refuse(format_args!("{length} bytes are no pairs of pictures"));
+        }
         let pairs = length / (2 * PICTURE);
         Self { file, clock, pairs, next: 0, started: false, taken: [None; 2] }
     }
@@ -56,7 +56,7 @@ impl CameraPair for Eyes<'_> {
         self.self_test()?;
         let left = self.next * 2 * PICTURE;
         self.taken = [Some(left), Some(left + PICTURE)];
-        self.next = (self.next + 1) % self.pairs;
+        self.next = if self.next + 1 < self.pairs { self.next + 1 } else { 0 };
         Ok(Stamps { done: [self.clock.micros(); 2] })
     }
 

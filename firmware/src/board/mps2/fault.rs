@@ -1,6 +1,8 @@
-//! What happens when the processor stops the image: it ends, and says where.
+//! What happens when the processor stops the image: it ends, and says where; or waits for the watchdog's reset.
 #![expect(unsafe_code, reason = "the runtime wants handlers marked so")]
 
+use super::watchdog::bite;
+use cortex_m::asm::wfi;
 use cortex_m_rt::{ExceptionFrame, exception};
 use semihosting::{eprintln, process::exit};
 
@@ -11,4 +13,13 @@ const FAULT: i32 = 70;
 unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
     eprintln!("hard fault at {:#010x}", frame.pc());
     exit(FAULT)
+}
+
+/// The watchdog's, half way to the reset.
+#[exception]
+unsafe fn NonMaskableInt() -> ! {
+    bite();
+    loop {
+        wfi();
+    }
 }

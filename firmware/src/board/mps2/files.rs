@@ -1,21 +1,29 @@
 //! Files of the PC that the emulator runs on.
 
 use core::ffi::CStr;
+use core::fmt::Display;
 use semihosting::experimental::env::args;
 use semihosting::fs::File;
+use semihosting::{eprintln, process::exit};
 
 /// Bytes of a path and of all arguments.
 const LONGEST: usize = 1024;
 
-/// The file that the image's first argument names, open to be read.
-///
-/// # Panics
-/// When there is no argument, or no such file.
+/// Exit code of an image that cannot run like this.
+const REFUSED: i32 = 1;
+
+/// End the image with a sentence.
+pub fn refuse(why: impl Display) -> ! {
+    eprintln!("{why}");
+    exit(REFUSED)
+}
+
+/// The file that the image's first argument names, open to be read. The image ends when there is none.
 pub fn argument() -> File {
-    let arguments = args::<LONGEST>().expect("arguments");
-    let path = (&arguments).into_iter().nth(1).expect("an argument, a file").expect("text");
+    let Ok(arguments) = args::<LONGEST>() else { refuse("there are no arguments") };
+    let Some(Ok(path)) = (&arguments).into_iter().nth(1) else { refuse("the argument, a file, is missing") };
     let mut name = [0; LONGEST];
-    name[..path.len()].copy_from_slice(path.as_bytes());
-    let path = CStr::from_bytes_until_nul(&name).expect("ended by zero");
-    File::open(path).unwrap_or_else(|_| panic!("cannot open {path:?}"))
+    name.iter_mut().zip(path.bytes()).for_each(|(place, byte)| *place = byte);
+    let file = CStr::from_bytes_until_nul(&name).ok().and_then(|name| File::open(name).ok());
+    file.unwrap_or_else(|| refuse(format_args!("cannot open {path}")))
 }

@@ -12,12 +12,13 @@ mod uart;
 mod watchdog;
 
 pub use eyes::Eyes;
-pub use files::argument;
+pub use files::{argument, refuse};
 pub use flash::Flash;
 pub use timer::{Clock, Timer};
 pub use uart::Uart;
 pub use watchdog::Watchdog;
 
+use crate::device::Birth;
 use crate::record::Record;
 use cortex_m::Peripherals;
 
@@ -34,6 +35,8 @@ pub struct Board {
     pub flash: Record<Flash>,
     /// Resets the board when it hangs.
     pub watchdog: Watchdog,
+    /// Its name, why it has started, and how often it hung.
+    pub birth: Birth,
 }
 
 impl Board {
@@ -47,6 +50,7 @@ impl Board {
             timer: Timer::start(0x4000_0000),
             flash: Record::new(Flash::new(), 0),
             watchdog: Watchdog::new(),
+            birth: watchdog::recall("emulated MPS2"),
         })
     }
 }

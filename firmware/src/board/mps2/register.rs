@@ -6,13 +6,14 @@
 pub(super) struct Register(*mut u32);
 
 impl Register {
-    /// The register at an address of the board's documentation; only such may be given here.
+    /// The register at an address of the board's documentation, or a word of memory that is nobody's; only such may
+    /// be given here.
     pub(super) const fn at(address: usize) -> Self {
         Self(core::ptr::without_provenance_mut(address))
     }
 
     pub(super) fn read(self) -> u32 {
-        // SAFETY: every address is that of a register, always there, aligned, without effect on memory.
+        // SAFETY: every address is that of a register, always there, aligned, without effect on what Rust knows of.
         unsafe { self.0.read_volatile() }
     }
 

@@ -77,8 +77,9 @@ pub(super) fn each_component(
     for v in top..=bottom + 1 {
         let whole = v == top || v == bottom;
         let count = if v <= bottom { find_runs(bitmap, (v, whole), ground, here) } else { 0 };
-        join(&mut above[..count_above], &mut here[..count], ground);
-        for (k, run) in above[..count_above].iter().enumerate() {
+        let done = above.get_mut(..count_above).unwrap_or_default();
+        join(done, here.get_mut(..count).unwrap_or_default(), ground);
+        for (k, run) in done.iter().enumerate() {
             if usize::from(run.parent) == k && run.heir == NOBODY {
                 let Run { area, first, on_border, .. } = *run;
                 complete(bitmap, Component { area, first, on_border: on_border != 0 });
@@ -93,7 +94,8 @@ fn find_runs(bitmap: &Bitmap<'_>, (v, whole): (usize, bool), ground: Ground, run
     let width = bitmap.size().width;
     let (mut count, mut start) = (0, 0);
     let mut add = |start: usize, end: usize| {
-        runs[count] = Run {
+        let Some(run) = runs.get_mut(count) else { return };
+        *run = Run {
             start: start as u16,
             end: end as u16,
             parent: count as u16,
@@ -146,33 +148,38 @@ fn join(above: &mut [Run], here: &mut [Run], ground: Ground) {
     }
     // Parents come first, so theirs are leaders already.
     for k in 0..here.len() {
-        here[k].parent = here[usize::from(here[k].parent)].parent;
+        if let Some(Run { parent, .. }) = here.get(usize::from(here[k].parent)) {
+            here[k].parent = *parent;
+        }
     }
 }
 
 /// Let the last run of `here` take over from the component of the last run of `above`.
 fn take_over(above: &mut [Run], here: &mut [Run]) {
-    let Some(touched) = above.last().map(|run| usize::from(run.parent)) else { return };
+    let leader = above.last().map(|run| usize::from(run.parent));
+    let Some(touched) = leader.and_then(|k| above.get_mut(k)) else { return };
+    let parent = |here: &[Run], k: usize| here.get(k).map(|run| usize::from(run.parent));
     let root = |here: &[Run], mut k: usize| {
-        while usize::from(here[k].parent) != k {
-            k = here[k].parent.into();
+        while let Some(above) = parent(here, k).filter(|parent| *parent != k) {
+            k = above;
         }
         k
     };
     let mine = root(here, here.len() - 1);
-    let (kept, other) = if above[touched].heir == NOBODY {
-        above[touched].heir = mine as u16;
-        (mine, above[touched])
+    let (kept, other) = if touched.heir == NOBODY {
+        touched.heir = mine as u16;
+        (mine, *touched)
     } else {
-        let other = root(here, above[touched].heir.into());
+        let other = root(here, touched.heir.into());
         if other == mine {
             return;
         }
         let (kept, gone) = (mine.min(other), mine.max(other));
-        here[gone].parent = kept as u16;
-        (kept, here[gone])
+        let Some(gone) = here.get_mut(gone) else { return };
+        gone.parent = kept as u16;
+        (kept, *gone)
     };
-    let kept = &mut here[kept];
+    let Some(kept) = here.get_mut(kept) else { return };
     kept.area += other.area;
     kept.on_border |= other.on_border;
     if (other.first.v, other.first.u) < (kept.first.v, kept.first.u) {
