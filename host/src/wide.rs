@@ -6,6 +6,10 @@
 
 #![expect(unsafe_code, reason = "the compiler cannot know which registers the machine has")]
 
+use ::wide::u8x16;
+use shared::bitmap::{Bitmap, Size, WORD_BITS, Word};
+use shared::limits::CapacityError;
+use shared::pack::pack_by;
 use shared::pipeline::Kernels;
 use shared::stage::parallel_thinning::Thin;
 
@@ -13,6 +17,22 @@ use shared::stage::parallel_thinning::Thin;
 pub fn kernels() -> Kernels {
     let thin = widths().into_iter().rev().find_map(|(_, thin)| thin);
     Kernels { thin: thin.unwrap_or(Kernels::PORTABLE.thin), ..Kernels::PORTABLE }
+}
+
+/// As [`shared::pack::pack`], sixteen bytes at once.
+///
+/// # Errors
+/// As there.
+pub fn pack<'w>(size: Size, bytes: &[u8], words: &'w mut [Word]) -> Result<Bitmap<'w>, CapacityError> {
+    pack_by(packed, size, bytes, words)
+}
+
+/// Bit `k` for each byte `k` that is not 0.
+fn packed(bytes: &[u8; WORD_BITS]) -> Word {
+    let sixteens = bytes.as_chunks().0.iter().rev();
+    !sixteens.fold(0, |clear, sixteen| {
+        clear << 16 | Word::from(u8x16::from(*sixteen).simd_eq(u8x16::ZERO).to_bitmask())
+    })
 }
 
 /// Thinning in registers wider than a word, the narrowest first, where this machine has them.
@@ -186,4 +206,22 @@ mod x86 {
     lanes!(Avx512 __m512i, 8, "avx512f,avx512bw,avx512vl,avx512dq,bmi1,bmi2,lzcnt,popcnt", avx512, _mm512_set1_epi64, _mm512_loadu_si512,
         _mm512_storeu_si512, _mm512_and_si512, _mm512_or_si512, _mm512_xor_si512, _mm512_sll_epi64, _mm512_srl_epi64,
         avx512_with);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_are_packed_as_by_the_core() {
+        for width in 0..200 {
+            let size = Size::new(width, 3).unwrap();
+            let mask: Vec<u8> = (0..3 * width as u32)
+                .map(|i| (i.wrapping_mul(0x9e37_79b9) >> 26).saturating_sub(30) as u8)
+                .collect();
+            let (mut words, mut expected) = ([Word::MAX; 64], [Word::MAX; 64]);
+            let bitmap = pack(size, &mask, &mut words).unwrap();
+            assert_eq!(bitmap, shared::pack::pack(size, &mask, &mut expected).unwrap(), "{width}");
+        }
+    }
 }

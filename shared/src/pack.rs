@@ -18,6 +18,20 @@ const DIAGONAL: u64 = 0x8040_2010_0804_0201;
 /// # Errors
 /// A [`CapacityError`] when there are fewer bytes or words than the size says.
 pub fn pack<'w>(size: Size, bytes: &[u8], words: &'w mut [Word]) -> Result<Bitmap<'w>, CapacityError> {
+    pack_by(packed, size, bytes, words)
+}
+
+/// [`pack`] with a machine's own way to pack a word: bit `k` for each byte `k` that is not 0.
+///
+/// # Errors
+/// As [`pack`].
+#[inline(always)]
+pub fn pack_by<'w>(
+    packed: impl Fn(&[u8; WORD_BITS]) -> Word,
+    size: Size,
+    bytes: &[u8],
+    words: &'w mut [Word],
+) -> Result<Bitmap<'w>, CapacityError> {
     let limit = bytes.len();
     let bytes = bytes.get(..size.pixels()).ok_or(CapacityError { what: "bytes of a mask", limit })?;
     let mut bitmap = Bitmap::over(size, words)?;

@@ -95,7 +95,7 @@ fn vertices_lie_on_the_surface_and_faces_near_it() {
     checked(&mesh).unwrap();
     for &vertex in &mesh.vertices {
         let off = naive_distance(&cones, vertex).abs();
-        assert!(off < 2e-6, "{vertex} {off}");
+        assert!(off < 5e-4, "{vertex} {off}");
     }
     let off_at = |face| {
         let [a, b, c] = mesh.corners(face);

@@ -7,7 +7,7 @@
 //!
 //! The union is an implicit function, the least of the exact signed distances to the cones
 //! (`distance.rs`). It is looked at only where the surface can pass (`region.rs`, `block.rs`), there with
-//! the cones that can be the nearest (`prune.rs`, `bundle.rs`), on a body-centred cubic lattice
+//! the cones that can decide where (`prune.rs`, `bundle.rs`), on a body-centred cubic lattice
 //! (`lattice.rs`) whose tetrahedra are cut where the function changes its sign (`patch.rs`). Each point, edge
 //! and tetrahedron belongs to one block and is worked out once (`mesher.rs`). Tetrahedra, because a plane
 //! cuts one in a triangle or a quadrilateral and nothing else: there is no ambiguous case, so the promise
@@ -86,7 +86,7 @@ const CUBE: f64 = 1.5;
 /// Meshes the boundary of the union of `cones`.
 ///
 /// `cell`, mm, is the size of the smallest features that are kept; edges of faces are about 0.6 cells
-/// long. Vertices lie within 1e-6 cells of the true surface, but for a few in creases or on cones thinner
+/// long. Vertices lie within 5e-4 cells of the true surface, but for a few in creases or on cones thinner
 /// than the cell.
 ///
 /// # Errors

@@ -14,22 +14,19 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use nalgebra::Point3;
 
 use super::{
-    bundle::{Bundle, Group, ROUNDING, SITES, prepare},
+    bundle::{Bundle, Group, SITES},
     lanes::LANES,
-    lattice::{LOWERED, Lattice, MAX_SHIFT, SIDE, point_of},
+    lattice::{MAX_SHIFT, SIDE, point_of},
     prune::{Answer, prune},
     region::{Level, Octant, Region, Solid},
 };
 
-/// A block takes about 8 kB with its cones, and about 6 kB of mesh, so that this many take 1 GB.
+/// A block takes about 4 kB with its cones, and about 6 kB of mesh, so that this many take 700 MB.
 pub(super) const MAX_BLOCKS: usize = 1 << 16;
 
 /// Points are moved to at least this distance off the surface, in cubes. Twice that is the most that one
 /// is moved: from just outside to inside.
-const CLEAR: f64 = MAX_SHIFT / 2.0;
-
-/// Cubes along the side of a leaf.
-const LEAF: i32 = 2;
+pub(super) const CLEAR: f64 = MAX_SHIFT / 2.0;
 
 /// An edge that the surface cuts is up to a cube and two shifts long: so far off the surface its ends are.
 pub(super) const EDGE: f32 = 1.5;
@@ -42,26 +39,17 @@ pub(super) struct Block {
     /// Corners of cubes, and middles, that are inside.
     pub(super) inside: [u64; 2],
     /// Those that have been moved.
-    moved: [u64; 2],
+    pub(super) moved: [u64; 2],
     /// Where the moved ones stand in [`Grove::moved`]; corners first.
     first_moved: u32,
-    leaves: [Leaf; 8],
-    /// The cone that decides the distance of each point, corners first.
-    cones: [u32; 128],
-    /// How far all others of its leaf are from each point at least, cubes; less than nothing if not known.
-    others: [f32; 128],
-}
-
-/// An eighth of a block.
-#[derive(Clone, Copy, Debug)]
-struct Leaf {
-    /// Its cones in [`Grove::cones`]; none where the surface does not pass.
+    /// Its cones in [`Grove::cones`], from the first on, and in [`Grove::groups`].
     first_cone: u32,
-    cones: u32,
-    /// In [`Grove::groups`].
+    count: u32,
     first_group: u32,
-    /// The cone nearest to its middle.
-    nearest: u32,
+    /// The cone that decides the distance of each point, corners first.
+    pub(super) cones: [u32; 128],
+    /// How far all others of its leaf are from each point at least, cubes; less than nothing if not known.
+    pub(super) others: [f32; 128],
 }
 
 /// The blocks under one region, with what belongs to them.
@@ -69,8 +57,10 @@ struct Leaf {
 pub(super) struct Grove {
     pub(super) blocks: Vec<Block>,
     moved: Vec<Point3<f64>>,
-    /// Where the moved points of the block that is added stand, by kind and cube.
+    /// Of the block that is added: where its moved points stand, by kind and cube, and the leaves that each of its cones
+    /// touches.
     shifted: Vec<[Point3<f64>; 64]>,
+    touching: Vec<u32>,
     cones: Vec<u32>,
     groups: Vec<Group>,
     /// Of the regions on the way down, by level.
@@ -78,26 +68,21 @@ pub(super) struct Grove {
     answers: Vec<Answer>,
 }
 
-/// Offsets of the points of a leaf from its middle, in cubes: corners of cubes first.
-const OFFSETS: [[[f32; LANES]; 3]; SITES / LANES] = {
-    let mut offsets = [[[0.0; LANES]; 3]; SITES / LANES];
-    let mut i = 0;
-    while i < SITES {
-        let lowest = if i < 8 { -0.75 } else { -0.25 };
-        let mut axis = 0;
-        while axis < 3 {
-            offsets[i / LANES][axis][i % LANES] = lowest + (i >> (2 - axis) & 1) as f32;
-            axis += 1;
-        }
-        i += 1;
-    }
-    offsets
-};
-
 /// The bit in a block of a cube of one of its leaves.
 fn bit_of(leaf: usize, cube: usize) -> usize {
     let spread = |octant: usize| (octant >> 2) << 4 | (octant >> 1 & 1) << 2 | octant & 1;
     spread(leaf) << 1 | spread(cube)
+}
+
+/// The bits in a block of those cubes of one of its leaves.
+fn bits_of(leaf: usize, cubes: u32) -> u64 {
+    let pairs = u64::from(cubes);
+    (pairs & 0x3 | (pairs & 0xc) << 2 | (pairs & 0x30) << 12 | (pairs & 0xc0) << 14) << bit_of(leaf, 0)
+}
+
+/// Where in a block's lists a point of a leaf is.
+fn place_of(leaf: usize, site: usize) -> usize {
+    64 * (site >> 3) + bit_of(leaf, site & 7)
 }
 
 impl Grove {
@@ -132,9 +117,10 @@ impl Grove {
             return;
         }
         for octant in Octant::all(region) {
-            below[0].cones.clear();
-            prune(&bundle, octant.around, EDGE, &mut self.answers, &mut below[0].cones);
-            if !below[0].cones.is_empty() {
+            let cones = &mut below[0].cones;
+            cones.clear();
+            prune(&bundle, octant.around, &mut self.answers, cones);
+            if !cones.is_empty() {
                 self.descend(solid, octant.region, below, found);
             }
         }
@@ -142,66 +128,50 @@ impl Grove {
 
     /// Adds the block that is `region`.
     fn plant(&mut self, solid: &Solid, region: Region, bundle: &Bundle) {
-        let leaf = Leaf { first_cone: 0, cones: 0, first_group: 0, nearest: 0 };
         let mut block = Block {
             corner: region.corner,
             inside: [0; 2],
             moved: [0; 2],
             first_moved: self.moved.len() as u32,
-            leaves: [leaf; 8],
+            first_cone: self.cones.len() as u32,
+            count: bundle.cones.len() as u32,
+            first_group: self.groups.len() as u32,
             cones: [0; 128],
             others: [-1.0; 128],
         };
+        self.cones.extend(bundle.cones);
+        self.groups.extend(bundle.groups);
         self.shifted.resize(2, [Point3::origin(); 64]);
-        for (octant, Octant { region, around }) in Octant::all(region).enumerate() {
-            let first_cone = self.cones.len();
-            let middle = prune(bundle, around, 0.0, &mut self.answers, &mut self.cones);
-            let leaf = Leaf {
-                first_cone: first_cone as u32,
-                cones: (self.cones.len() - first_cone) as u32,
-                first_group: self.groups.len() as u32,
-                nearest: middle.nearest,
-            };
-            block.leaves[octant] = leaf;
-            if leaf.cones == 0 {
-                for i in 0..SITES {
-                    let (kind, bit) = (i >> 3, bit_of(octant, i & 7));
-                    block.inside[kind] |= u64::from(middle.distance < 0.0) << bit;
-                    block.cones[64 * kind + bit] = middle.nearest;
+        let leaves = bundle.leaves(CLEAR as f32, &mut self.touching);
+        for octant in 0..8 {
+            if leaves.whole >> octant & 1 == 1 {
+                if leaves.inside >> octant & 1 == 1 {
+                    block.inside.iter_mut().for_each(|inside| *inside |= bits_of(octant, 0xff));
+                    let nearest = bundle.cones[leaves.nearest[octant]];
+                    (0..SITES).for_each(|i| block.cones[place_of(octant, i)] = nearest);
                 }
                 continue;
             }
-            let centre = solid.middle(region);
-            let cones = &self.cones[first_cone..];
-            prepare(cones, solid.distances, &centre, solid.lattice.cube, &mut self.groups);
-            let bundle = Bundle { cones, groups: &self.groups[leaf.first_group as usize..], middle: centre };
-            let (distances, places, others) = bundle.nearest_of_sites(&OFFSETS);
+            let sites = bundle.nearest_of_sites(octant, &self.touching, CLEAR as f32);
             for i in 0..SITES {
-                let (kind, bit) = (i >> 3, bit_of(octant, i & 7));
-                let cone = cones[places[i]];
-                let blur = 4.0
-                    * ROUNDING
-                    * (distances[i].abs()
-                        + 4.0
-                        + (solid.distances[cone as usize].radius / solid.lattice.cube) as f32);
-                if distances[i].abs() > CLEAR as f32 + blur {
-                    block.inside[kind] |= u64::from(distances[i] < 0.0) << bit;
-                    block.cones[64 * kind + bit] = cone;
-                    block.others[64 * kind + bit] = others[i];
-                    continue;
-                }
-                let unmoved = solid.lattice.position(point_of(region.corner, bit_of(0, i & 7), kind));
-                let site = bundle.site(unmoved, solid);
-                block.inside[kind] |= u64::from(site.distance < 0.0) << bit;
-                block.cones[64 * kind + bit] = site.cone;
-                if site.cone == cone {
-                    block.others[64 * kind + bit] = others[i] - MAX_SHIFT as f32;
-                }
-                if site.position != unmoved {
-                    block.moved[kind] |= 1 << bit;
-                    self.shifted[kind][bit] = site.position;
-                }
+                block.cones[place_of(octant, i)] = sites.cones[i];
+                block.others[place_of(octant, i)] = sites.others[i];
             }
+            let mut inside = sites.inside;
+            for i in bits(sites.near.into()) {
+                let (kind, bit, place) = (i >> 3, bit_of(octant, i & 7), place_of(octant, i));
+                let unmoved = solid.lattice.position(point_of(region.corner, bit, kind));
+                let known = (sites.cones[i], sites.others[i]);
+                let Some(site) = bundle.site(unmoved, known, solid) else { continue };
+                inside = inside & !(1 << i) | u32::from(site.inside) << i;
+                let same = site.cone == sites.cones[i];
+                block.others[place] = if same { sites.others[i] - MAX_SHIFT as f32 } else { -1.0 };
+                block.cones[place] = site.cone;
+                block.moved[kind] |= 1 << bit;
+                self.shifted[kind][bit] = site.position;
+            }
+            block.inside[0] |= bits_of(octant, inside & 0xff);
+            block.inside[1] |= bits_of(octant, inside >> 8);
         }
         for (set, places) in block.moved.iter().zip(&self.shifted) {
             self.moved.extend(bits(*set).map(|bit| places[bit]));
@@ -209,56 +179,19 @@ impl Grove {
         self.blocks.push(block);
     }
 
-    /// Where a point of `block` stands, mm.
-    pub(super) fn position(&self, solid: &Solid, block: &Block, kind: usize, bit: usize) -> Point3<f64> {
-        if block.moved[kind] >> bit & 1 == 0 {
-            return solid.lattice.position(point_of(block.corner, bit, kind));
-        }
+    /// Where a point of `block` that has been moved stands, mm.
+    pub(super) fn moved(&self, block: &Block, kind: usize, bit: usize) -> Point3<f64> {
         let before = block.moved[kind] & ((1 << bit) - 1);
         let others = if kind == 1 { block.moved[0].count_ones() } else { 0 };
         self.moved[(block.first_moved + others + before.count_ones()) as usize]
     }
 
-    /// Of the cones but one that contain `p`, which is in the given leaf of `block`, by more than `exact` mm,
-    /// the one that it is deepest in.
-    pub(super) fn deepest_but(
-        &self,
-        known: u32,
-        solid: &Solid,
-        (block, octant): (&Block, usize),
-        (p, exact): (&Point3<f64>, f64),
-    ) -> Option<u32> {
-        let leaf = &block.leaves[octant];
-        if leaf.cones == 0 {
-            let inside = known != leaf.nearest && solid.distances[leaf.nearest as usize].at(p) < -exact;
-            return inside.then_some(leaf.nearest);
-        }
-        let cones = &self.cones[leaf.first_cone as usize..][..leaf.cones as usize];
-        let region = Region { corner: block.corner, cubes: SIDE }.octant(octant);
-        let groups = &self.groups[leaf.first_group as usize..][..cones.len().div_ceil(LANES)];
-        let bundle = Bundle { cones, groups, middle: solid.middle(region) };
-        bundle.deepest_but(known, p, (solid.lattice.cube, exact), solid.distances)
-    }
-}
-
-impl Block {
-    /// The cones that decide the distances of the points of a kind, and how far all others of their leaves are at
-    /// least, cubes; less than nothing where that is not known.
-    pub(super) fn nearest(&self, kind: usize) -> (&[u32], &[f32]) {
-        let points = 64 * kind..64 * kind + 64;
-        (&self.cones[points.clone()], &self.others[points])
-    }
-
-    /// The points of a kind that have been moved.
-    pub(super) fn moved(&self, kind: usize) -> u64 {
-        self.moved[kind]
-    }
-
-    /// The leaf in which `p` is, of this block or of one ahead, as in [`leaf_at`](super::near::leaf_at).
-    pub(super) fn leaf_of(&self, lattice: &Lattice, p: &Point3<f64>) -> usize {
-        let from_corner = (p - lattice.position(self.corner)) * (1.0 / lattice.cube);
-        let leaf = |axis: usize| ((from_corner[axis] + LOWERED).max(0.0) / f64::from(LEAF)) as usize;
-        leaf(0).min(2) * 9 + leaf(1).min(2) * 3 + leaf(2).min(2)
+    /// As [`Bundle::nearest`], of a place in `block`.
+    pub(super) fn nearest(&self, solid: &Solid, block: &Block, p: &Point3<f64>) -> (f32, u32) {
+        let cones = &self.cones[block.first_cone as usize..][..block.count as usize];
+        let groups = &self.groups[block.first_group as usize..][..cones.len().div_ceil(LANES)];
+        let middle = solid.middle(Region { corner: block.corner, cubes: SIDE });
+        Bundle { cones, groups, middle }.nearest(p, solid.lattice.cube)
     }
 }
 
@@ -276,54 +209,49 @@ pub(super) fn bits(mut word: u64) -> impl Iterator<Item = usize> {
 /// A lattice point near the surface, moved off it.
 struct Site {
     position: Point3<f64>,
-    /// Signed distance there, mm.
-    distance: f64,
+    inside: bool,
     cone: u32,
 }
 
 impl Bundle<'_> {
-    /// The lattice point at `position`, moved until it is [`CLEAR`] of the surface.
-    fn site(&self, position: Point3<f64>, solid: &Solid) -> Site {
-        let cube = solid.lattice.cube;
-        let clear = CLEAR * cube;
-        let (distance, cone) = self.nearest(&position, cube, solid.distances);
-        let unmoved = Site { position, distance, cone };
-        if distance.abs() >= clear {
-            return unmoved;
+    /// Where a point near the surface, of which `cone` decides, is clear of the surface; nothing if it stays where it is.
+    /// All other cones are at least `others` cubes off.
+    fn site(&self, position: Point3<f64>, (cone, others): (u32, f32), solid: &Solid) -> Option<Site> {
+        let (cube, deciding) = (solid.lattice.cube, &solid.distances[cone as usize]);
+        let distance = deciding.at(&position) / cube;
+        if distance.abs() >= CLEAR {
+            return None;
         }
-        let Some(outward) = solid.distances[cone as usize].outward(&position, 0.0) else {
-            return unmoved;
-        };
+        let outward = deciding.outward(&position, 0.0)?;
         // Away from the surface; but from a crease outward there is no getting away, only inward.
-        for target in [clear.copysign(distance), -clear] {
-            let position = position + outward * (target - distance);
-            let (distance, cone) = self.nearest(&position, cube, solid.distances);
-            if distance.abs() > 0.99 * clear {
-                return Site { position, distance, cone };
-            }
-        }
-        unmoved
+        [CLEAR.copysign(distance), -CLEAR].into_iter().find_map(|target| {
+            let position = position + outward * ((target - distance) * cube);
+            let own = deciding.at(&position) / cube;
+            let (distance, cone) = if own < f64::from(others) - MAX_SHIFT {
+                (own, cone)
+            } else {
+                let (distance, cone) = self.nearest(&position, cube);
+                (distance.into(), cone)
+            };
+            (distance.abs() > 0.99 * CLEAR).then_some(Site { position, inside: distance < 0.0, cone })
+        })
     }
 }
 
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::stage::surface::{RoundCone, distance::Distance};
+    use crate::stage::surface::{RoundCone, distance::Distance, lattice::Lattice};
+    use nalgebra::Vector3;
 
     /// Thirty cones in 20 mm, thick and thin, some along the axes.
     pub(in crate::stage::surface) fn cones() -> Vec<RoundCone> {
         let at = |i: i32| Point3::new(f64::from(i * 7 % 20), f64::from(i * 11 % 19), f64::from(i * 5 % 17));
         let cone = |i: i32| {
-            let end = if i % 3 == 0 { at(i) + nalgebra::Vector3::y() * 4.0 } else { at(i + 1) };
+            let end = if i % 3 == 0 { at(i) + Vector3::y() * 4.0 } else { at(i + 1) };
             RoundCone { centres: [at(i), end], radii: [0.4 + f64::from(i % 4), 1.5] }
         };
         (0..30).map(cone).collect()
-    }
-
-    /// The leaf of a cube of a block.
-    fn leaf_at(bit: usize) -> usize {
-        (bit >> 5) << 2 | (bit >> 3 & 1) << 1 | bit >> 1 & 1
     }
 
     fn grown(cones: &[RoundCone], cube: f64, check: impl Fn(&Solid, &Grove)) {
@@ -347,10 +275,10 @@ pub(super) mod tests {
             };
             (0..count).map(|i| RoundCone { centres: [at(i), at(i + 1)], radii: [25.0; 2] }).collect()
         };
-        // Each of a leaf's cones is asked about each of its points.
+        // Each of a block's cones is asked about each of its leaves.
         let asked = |count, cube| {
             let asked = std::cell::Cell::new(0);
-            grown(&limb(count), cube, |_, grove| asked.set(grove.cones.len() * SITES));
+            grown(&limb(count), cube, |_, grove| asked.set(grove.cones.len()));
             f64::from(asked.get() as u32)
         };
         let (coarse, fine) = (asked(50, 3.0), asked(50, 1.5));
@@ -359,25 +287,46 @@ pub(super) mod tests {
         assert!(sparse_per_leaf < 2.5, "{sparse_per_leaf}");
     }
 
+    /// Places all over the leaf in which a cube is.
+    fn places_in_leaf(solid: &Solid, block: &Block, bit: usize) -> impl Iterator<Item = Point3<f64>> {
+        let octant = (bit >> 5) << 2 | (bit >> 3 & 1) << 1 | bit >> 1 & 1;
+        let middle = solid.middle(Region { corner: block.corner, cubes: SIDE }.octant(octant));
+        let step = solid.lattice.cube / 2.0;
+        let along = move |i: i32| f64::from(i - 2) * step;
+        (0..125).map(move |i| middle + Vector3::new(along(i / 25), along(i / 5 % 5), along(i % 5)))
+    }
+
     #[test]
     fn points_are_as_the_nearest_of_all_cones_says_and_moved_ones_clear() {
         grown(&cones(), 0.7, |solid, grove| {
             let mut moved = 0;
             for block in &grove.blocks {
                 for (kind, bit) in (0..2).flat_map(|kind| (0..64).map(move |bit| (kind, bit))) {
-                    let p = grove.position(solid, block, kind, bit);
+                    let unmoved = solid.lattice.position(point_of(block.corner, bit, kind));
+                    let is_moved = block.moved[kind] >> bit & 1 == 1;
+                    let p = if is_moved { grove.moved(block, kind, bit) } else { unmoved };
                     let far = |cone: &Distance| cone.at(&p);
                     let least = solid.distances.iter().map(far).fold(f64::INFINITY, f64::min);
                     assert_eq!(block.inside[kind] >> bit & 1 == 1, least < 0.0, "{p}");
-                    let own = far(&solid.distances[block.nearest(kind).0[bit] as usize]);
+                    let (nearest, others) = (block.cones[64 * kind + bit], block.others[64 * kind + bit]);
+                    let own = far(&solid.distances[nearest as usize]);
                     assert!(least > 0.0 || own < 0.0, "{p} {own} {least}");
-                    let leaf = &block.leaves[leaf_at(bit)];
-                    for &cone in &grove.cones[leaf.first_cone as usize..][..leaf.cones as usize] {
-                        let other = far(&solid.distances[cone as usize]) / solid.lattice.cube;
-                        let known = f64::from(block.others[64 * kind + bit]);
-                        assert!(cone == block.nearest(kind).0[bit] || known <= other, "{p} {known} {other}");
+                    // What is nearer than others are known to be decides nowhere in the leaf.
+                    let least_of = |cones: &[(usize, &Distance)], q: &Point3<f64>| {
+                        cones.iter().map(|(_, cone)| cone.at(q)).fold(f64::INFINITY, f64::min)
+                    };
+                    let is_nearer = |&(i, cone): &(usize, &Distance)| {
+                        i != nearest as usize && far(cone) < f64::from(others) * solid.lattice.cube
+                    };
+                    let (nearer, listed): (Vec<_>, Vec<_>) =
+                        solid.distances.iter().enumerate().partition(is_nearer);
+                    if others > 0.0 && !nearer.is_empty() {
+                        for q in places_in_leaf(solid, block, bit) {
+                            let [nearer, listed] = [&nearer, &listed].map(|cones| least_of(cones, &q));
+                            assert!(nearer >= listed.min(0.0) - 1e-9, "{p} {q}: {nearer} {listed}");
+                        }
                     }
-                    let way = (p - solid.lattice.position(point_of(block.corner, bit, kind))).norm();
+                    let way = (p - unmoved).norm();
                     assert!(way <= MAX_SHIFT * solid.lattice.cube * (1.0 + 1e-9), "{way}");
                     if way > 0.0 {
                         assert!(least.abs() > 0.99 * CLEAR * solid.lattice.cube);

@@ -65,28 +65,25 @@ impl Distance {
     /// left at a ball between the ends, that is the place, and otherwise it is at one of the ends.
     pub(super) fn exit(&self, from: &Point3<f64>, step: &Vector3<f64>) -> Option<f64> {
         let from_start = from - self.start;
-        let square = step.norm_squared();
-        let of_ball = |s: f64| {
-            let from_centre = from_start - self.axis * s;
-            let radius = self.radius + self.slope * s;
-            exit_of(square, from_centre.dot(step), from_centre.norm_squared() - radius * radius)
-        };
+        // Of the ball at the start; those of others follow.
+        let [a, b, c] = [
+            step.norm_squared(),
+            from_start.dot(step),
+            from_start.norm_squared() - self.radius * self.radius,
+        ];
         if self.length == 0.0 {
-            return of_ball(0.0);
+            return exit_of(a, b, c);
         }
         let (along, ahead) = (from_start.dot(&self.axis), step.dot(&self.axis));
-        let tangent = 1.0 / (1.0 - self.slope * self.slope);
-        // A point is deepest, by squares, in the ball at `deepest`, which moves by `moved` a step.
         let base = along + self.slope * self.radius;
-        let (deepest, moved) = (base * tangent, ahead * tangent);
-        let side = exit_of(
-            square - ahead * moved,
-            from_start.dot(step) - base * moved,
-            from_start.norm_squared() - self.radius * self.radius - base * deepest,
-        );
+        let flat = 1.0 - self.slope * self.slope;
+        // A point is deepest, by squares, in the ball at `deepest`, which moves by `moved` a step.
+        let (deepest, moved) = (base / flat, ahead / flat);
+        let side = exit_of(a - ahead * moved, b - base * moved, c - base * deepest);
         if let Some(share) = side.filter(|share| (0.0..=self.length).contains(&(deepest + moved * share))) {
             return Some(share);
         }
+        let of_ball = |s: f64| exit_of(a, b - ahead * s, c - (base + base - flat * s) * s);
         [of_ball(0.0), of_ball(self.length)].into_iter().flatten().reduce(f64::max)
     }
 

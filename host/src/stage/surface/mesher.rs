@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::{
     CUBE, RoundCone, SurfaceError,
-    block::{EDGE, Grove, MAX_BLOCKS},
+    block::{Grove, MAX_BLOCKS},
     distance::Distance,
     lattice::{Lattice, SIDE},
     near::{Numbers, Points},
@@ -23,7 +23,7 @@ use super::{
 use crate::mesh::Mesh;
 
 /// The solid is divided until there are so many regions, which are then worked on side by side.
-const GROVES: usize = 64;
+const GROVES: usize = 32;
 
 /// What [`surface`](super::surface) needs on the way, kept from one solid to the next: once it has grown to
 /// their size, nothing more is allocated.
@@ -37,8 +37,11 @@ pub struct Mesher {
     groves: Vec<Grove>,
     /// Of the blocks of each grove.
     cuts: Vec<Vec<Cut>>,
-    places: HashMap<[i32; 3], Place, BuildHasherDefault<Mixer>>,
+    places: Places,
 }
+
+/// The place of each block, by [`name`].
+type Places = HashMap<u64, Place, BuildHasherDefault<Mixer>>;
 
 /// Regions with their cones.
 #[derive(Debug, Default)]
@@ -96,7 +99,8 @@ impl Mesher {
         self.places.clear();
         for (number, grove) in groves.iter().enumerate() {
             let places = grove.blocks.iter().enumerate();
-            self.places.extend(places.map(|(place, block)| (block.corner, (number as u32, place as u32))));
+            self.places
+                .extend(places.map(|(place, block)| (name(block.corner), (number as u32, place as u32))));
         }
         let wood = Wood { groves, places: &self.places };
         cuts.par_iter_mut().enumerate().for_each(|(grove, cuts)| {
@@ -134,7 +138,7 @@ impl Seeds {
             let bundle = level.bundle(solid, *region);
             for octant in Octant::all(*region) {
                 let start = next.cones.len();
-                prune(&bundle, octant.around, EDGE, answers, &mut next.cones);
+                prune(&bundle, octant.around, answers, &mut next.cones);
                 if next.cones.len() > start {
                     next.regions.push((octant.region, start..next.cones.len()));
                 }
@@ -158,7 +162,7 @@ fn number(cuts: &mut [Vec<Cut>]) -> u32 {
 #[derive(Clone, Copy)]
 struct Wood<'a> {
     groves: &'a [Grove],
-    places: &'a HashMap<[i32; 3], Place, BuildHasherDefault<Mixer>>,
+    places: &'a Places,
 }
 
 impl<'a> Wood<'a> {
@@ -167,7 +171,7 @@ impl<'a> Wood<'a> {
         let corner = self.groves[grove].blocks[place].corner;
         std::array::from_fn(|ahead| {
             let step = |axis: usize| (ahead >> (2 - axis) & 1) as i32 * 2 * SIDE;
-            self.places.get(&[corner[0] + step(0), corner[1] + step(1), corner[2] + step(2)]).copied()
+            self.places.get(&name([0, 1, 2].map(|axis| corner[axis] + step(axis)))).copied()
         })
     }
 
@@ -183,7 +187,7 @@ impl<'a> Wood<'a> {
         let count = |of: fn(&Cut) -> u32| cuts.iter().flatten().map(|cut| of(cut) as usize).sum();
         mesh.vertices.resize(count(|cut| cut.vertices), Point3::origin());
         spread(0, cuts, &mut mesh.vertices, |cut| cut.vertices, &|grove, mut vertices| {
-            let mut points = Points::default();
+            let mut points = Points::new(solid.lattice);
             for cut in cuts[grove].iter().filter(|cut| cut.vertices > 0) {
                 let (own, others) = vertices.split_at_mut(cut.vertices as usize);
                 let blocks = self.blocks(&cut.ahead);
@@ -225,17 +229,22 @@ fn spread<T: Send>(
     );
 }
 
-/// Mixes the bits of a block's corner: std's hasher is proof against an enemy, which costs.
+/// The corner of a block as one number: on each axis it is far below 2^21.
+fn name(corner: [i32; 3]) -> u64 {
+    corner.into_iter().fold(0, |name, x| name << 21 | u64::from(x.cast_unsigned()))
+}
+
+/// Mixes the bits of a block's name: std's hasher is proof against an enemy, which costs.
 #[derive(Debug, Default)]
 struct Mixer(u64);
 
 impl Hasher for Mixer {
     fn write(&mut self, bytes: &[u8]) {
-        bytes.iter().for_each(|&byte| self.write_i32(i32::from(byte)));
+        bytes.iter().for_each(|&byte| self.write_u64(byte.into()));
     }
 
-    fn write_i32(&mut self, x: i32) {
-        self.0 = (self.0.rotate_left(26) ^ u64::from(x.cast_unsigned())).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    fn write_u64(&mut self, x: u64) {
+        self.0 = (self.0 ^ x).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     }
 
     fn finish(&self) -> u64 {

@@ -5,17 +5,17 @@
 //! or a quadrilateral. Each edge and each tetrahedron belongs to one cube, and so to one block; its vertices
 //! are numbered by direction of the edge, and then by cube.
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 use super::{
     block::{Block, Grove, bits},
-    lattice::{Corner, EDGES, ENDS, Edge, TETRAHEDRA, seen_ahead},
-    near::{AHEAD, Numbers, PLACES, Points, Seen, block_of},
+    lattice::{Corner, EDGES, ENDS, Edge, TETRAHEDRA, Tetrahedron, seen_ahead},
+    near::{Numbers, PLACES, Points, Seen, block_of},
     region::Solid,
 };
 
-/// A vertex is this close to the surface, in cubes.
-const EXACT: f64 = 5e-7;
+/// A vertex is this close to the surface, in cubes: a hundredth of what a contour is wrong by.
+const EXACT: f32 = 1e-4;
 
 /// Steps after which the search for a vertex ends; it needs one or two where the surface is smooth.
 const MAX_STEPS: usize = 40;
@@ -71,27 +71,33 @@ pub(super) type Blocks<'a> = [Option<(&'a Grove, &'a Block)>; 8];
 fn inside(blocks: &Blocks) -> [[u64; 8]; 2] {
     let own = blocks[0].expect("a block").1;
     // The middle of the last cube has an edge to each block ahead, which is not cut if that is missing.
-    let missing = 0_u64.wrapping_sub(own.inside[1] >> 63);
-    [0, 1].map(|kind| seen_ahead(blocks.map(|block| block.map_or(missing, |(_, block)| block.inside[kind]))))
+    let mut inside = [[0_u64.wrapping_sub(own.inside[1] >> 63); 8]; 2];
+    for (ahead, block) in blocks.iter().enumerate() {
+        if let Some((_, block)) = block {
+            (inside[0][ahead], inside[1][ahead]) = (block.inside[0], block.inside[1]);
+        }
+    }
+    [seen_ahead(inside[0]), seen_ahead(inside[1])]
 }
 
 impl Cut {
     /// What of a block is cut; its first vertex is yet to be numbered.
     pub(super) fn of(blocks: &Blocks, ahead: [Option<Place>; 8]) -> Self {
         let inside = inside(blocks);
-        let edges = ENDS.map(|[a, b]| inside[a.kind][a.ahead] ^ inside[b.kind][b.ahead]);
-        let (mut first, mut vertices) = ([0; EDGES], 0);
-        for (first, edge) in first.iter_mut().zip(edges) {
-            *first = vertices as u16;
-            vertices += edge.count_ones();
+        let (mut edges, mut first, mut vertices) = ([0; EDGES], [0; EDGES], 0);
+        for (direction, [a, b]) in ENDS.iter().enumerate() {
+            edges[direction] = inside[a.kind][a.ahead] ^ inside[b.kind][b.ahead];
+            first[direction] = vertices as u16;
+            vertices += edges[direction].count_ones();
         }
-        let faces = TETRAHEDRA.iter().map(|tetrahedron| {
-            let [a, b, c, d] = tetrahedron.corners.map(|corner| inside[corner.kind][corner.ahead]);
-            let triangles = a ^ b ^ c ^ d;
-            let cut = (a | b | c | d) & !(a & b & c & d);
-            triangles.count_ones() + 2 * (cut & !triangles).count_ones()
-        });
-        Self { edges, first, first_vertex: 0, vertices, faces: faces.sum(), ahead }
+        let mut faces = 0;
+        if vertices > 0 {
+            for tetrahedron in &TETRAHEDRA {
+                let [triangles, quadrilaterals] = cut(tetrahedron, &inside);
+                faces += triangles.count_ones() + 2 * quadrilaterals.count_ones();
+            }
+        }
+        Self { edges, first, first_vertex: 0, vertices, faces, ahead }
     }
 
     /// The edges in a direction that are cut, and the number of the first one's vertex.
@@ -107,16 +113,15 @@ impl Cut {
         points: &Points,
         vertices: &mut [Point3<f64>],
     ) {
-        let inside = inside(blocks);
+        let own = blocks[0].expect("a block").1;
         let mut vertices = vertices.iter_mut();
-        for (ends, &edges) in ENDS.iter().zip(&self.edges) {
-            let first_inside = inside[ends[0].kind][ends[0].ahead];
+        for (&[first, second], &edges) in ENDS.iter().zip(&self.edges) {
+            let ends = [first, second].map(Points::offset);
             for bit in bits(edges) {
-                let [first, second] =
-                    ends.map(|Corner { kind, ahead }| points.at(kind, PLACES[bit] + AHEAD[ahead]));
-                let [from, to] =
-                    if first_inside >> bit & 1 == 1 { [&first, &second] } else { [&second, &first] };
-                *vertices.next().expect("a place for each vertex") = crossing(solid, blocks, from, to);
+                let ends = if own.inside[first.kind] >> bit & 1 == 1 { ends } else { [ends[1], ends[0]] };
+                let [start, end] = ends.map(|end| points.at(PLACES[bit] + end));
+                let crossing = Crossing { solid, blocks, points, start, end };
+                *vertices.next().expect("a place for each vertex") = crossing.place();
             }
         }
     }
@@ -132,34 +137,46 @@ impl Cut {
         let mut faces = faces.iter_mut();
         let mut put = |face| *faces.next().expect("a place for each face") = face;
         for (tetrahedron, rings) in TETRAHEDRA.iter().zip(&RINGS) {
-            let [a, b, c, d] = tetrahedron.corners.map(|corner| inside[corner.kind][corner.ahead]);
-            for bit in bits((a | b | c | d) & !(a & b & c & d)) {
+            let [a, b, c, d] = corners(tetrahedron, &inside);
+            let ring = |bit: usize| {
                 let set = (a >> bit & 1) | (b >> bit & 1) << 1 | (c >> bit & 1) << 2 | (d >> bit & 1) << 3;
-                let ring = &rings[set as usize];
-                let vertex = |i: usize| numbers.at(PLACES[bit] + usize::from(ring.edges[i]));
-                let [p, q, r] = [vertex(0), vertex(1), vertex(2)];
-                if ring.four {
-                    split([p, q, r, vertex(3)], vertices).into_iter().for_each(&mut put);
-                } else {
-                    put([p, q, r]);
-                }
+                let vertex = |edge: u16| numbers.at(PLACES[bit] + usize::from(edge));
+                let [p, q, r, s] = rings[set as usize];
+                [vertex(p), vertex(q), vertex(r), vertex(s)]
+            };
+            let [triangles, quadrilaterals] = cut(tetrahedron, &inside);
+            for bit in bits(triangles) {
+                let [p, q, r, _] = ring(bit);
+                put([p, q, r]);
+            }
+            for bit in bits(quadrilaterals) {
+                split(ring(bit), vertices).into_iter().for_each(&mut put);
             }
         }
     }
 }
 
-/// The edges of a tetrahedron that the surface cuts, in the order of the face's corners.
-#[derive(Clone, Copy)]
-struct Ring {
-    /// See [`Numbers::offset`].
-    edges: [u16; 4],
-    /// Whether they are four, or three.
-    four: bool,
+/// Of each of a tetrahedron's corners, the cubes whose corner it is that are inside.
+fn corners(tetrahedron: &Tetrahedron, inside: &[[u64; 8]; 2]) -> [u64; 4] {
+    let [a, b, c, d] = &tetrahedron.corners;
+    let of = |corner: &Corner| inside[corner.kind][corner.ahead];
+    [of(a), of(b), of(c), of(d)]
 }
+
+/// The cubes of which a tetrahedron is cut in a triangle, and those of which in a quadrilateral.
+fn cut(tetrahedron: &Tetrahedron, inside: &[[u64; 8]; 2]) -> [u64; 2] {
+    let [a, b, c, d] = corners(tetrahedron, inside);
+    let triangles = a ^ b ^ c ^ d;
+    [triangles, (a | b | c | d) & !(a & b & c & d) & !triangles]
+}
+
+/// The edges of a tetrahedron that the surface cuts, in the order of the face's corners: of a triangle the first
+/// three. See [`Numbers::offset`].
+type Ring = [u16; 4];
 
 /// For each tetrahedron and each set of its corners inside.
 const RINGS: [[Ring; 16]; TETRAHEDRA.len()] = {
-    let mut rings = [[Ring { edges: [0; 4], four: false }; 16]; TETRAHEDRA.len()];
+    let mut rings = [[[0; 4]; 16]; TETRAHEDRA.len()];
     let mut i = 0;
     while i < TETRAHEDRA.len() * 16 {
         let (tetrahedron, set) = (&TETRAHEDRA[i / 16], i % 16);
@@ -168,13 +185,11 @@ const RINGS: [[Ring; 16]; TETRAHEDRA.len()] = {
             2 => [[0, 2], [0, 3], [1, 3], [1, 2]],
             _ => [[0, 1], [0, 3], [0, 2], [0, 2]],
         };
-        let ring = &mut rings[i / 16][set];
-        ring.four = set.count_ones() == 2;
         let mut corner = 0;
         while corner < 4 {
             let [from, to] = pairs[corner];
             let Edge { direction, ahead } = tetrahedron.edges[FEWER_FIRST[set][from]][FEWER_FIRST[set][to]];
-            ring.edges[corner] = Numbers::offset(direction, ahead) as u16;
+            rings[i / 16][set][corner] = Numbers::offset(direction, ahead) as u16;
             corner += 1;
         }
         i += 1;
@@ -188,42 +203,73 @@ fn split([p, q, r, s]: [u32; 4], vertices: &[Point3<f64>]) -> [[u32; 3]; 2] {
     if apart(p, r) <= apart(q, s) { [[p, q, r], [p, r, s]] } else { [[p, q, s], [q, r, s]] }
 }
 
-impl Seen {
-    /// Whether `cone` decides the distance of this point, and no other cone of its leaf contains any place whose
-    /// distance from the point has this square, in cubes.
-    fn is_alone(&self, cone: u32, square: f64) -> bool {
-        let others = f64::from(self.others);
-        self.cone == cone && others > 0.0 && square < others * others
-    }
+/// An edge from a point inside to one outside.
+struct Crossing<'a> {
+    solid: &'a Solid<'a>,
+    blocks: &'a Blocks<'a>,
+    points: &'a Points,
+    start: Seen,
+    end: Seen,
 }
 
-/// Where the edge from a point inside to one outside first leaves the solid.
-///
-/// It leaves the cone that decides at its start; where it does, another may contain it, of which it is
-/// followed to its end, until none does. None can where an end of the edge knows that all others are further.
-fn crossing(solid: &Solid, blocks: &Blocks, start: &Seen, end: &Seen) -> Point3<f64> {
-    let [from, to] = [start.position, end.position];
-    let mut cone = start.cone;
-    let step = to - from;
-    let square = step.norm_squared() / (solid.lattice.cube * solid.lattice.cube);
-    let mut share = 0.0;
-    for _ in 0..MAX_STEPS {
-        let Some(exit) = solid.distances[cone as usize].exit(&from, &step) else { break };
-        share = exit;
-        let p = from + step * share;
-        let leaf = blocks[0].expect("a block").1.leaf_of(solid.lattice, &p);
-        let is_alone =
-            |end: &Seen, share: f64| end.leaf == leaf && end.is_alone(cone, share * share * square);
-        if is_alone(start, share) || is_alone(end, 1.0 - share) {
-            break;
+impl Crossing<'_> {
+    /// Where the edge first leaves the solid.
+    ///
+    /// It leaves the cone that decides at its start; where it does, another may contain it.
+    #[inline(always)]
+    fn place(&self) -> Point3<f64> {
+        let from = self.points.corner + self.start.position;
+        let step = self.end.position - self.start.position;
+        let share = self.solid.distances[self.start.cone as usize].exit(&from, &step);
+        let Some(mut share) = share else { return from + step * END };
+        let leaf = self.leaf_of(&step, share);
+        if !self.is_alone(self.start.cone, leaf, step.norm_squared(), share) {
+            share = self.follow(leaf, share);
         }
-        let (ahead, octant) = block_of(leaf);
-        let Some((grove, block)) = blocks[ahead] else { break };
-        let exact = EXACT * solid.lattice.cube;
-        let Some(deeper) = grove.deepest_but(cone, solid, (block, octant), (&p, exact)) else { break };
-        cone = deeper;
+        from + step * share.clamp(END, 1.0 - END)
     }
-    from + step * share.clamp(END, 1.0 - END)
+
+    /// From the share of the edge at which it leaves the cone that decides at its start to that at which it leaves the
+    /// solid: of what contains it there it is followed to the end, until nothing does.
+    #[inline(never)]
+    fn follow(&self, mut leaf: u32, mut share: f64) -> f64 {
+        let from = self.points.corner + self.start.position;
+        let step = self.end.position - self.start.position;
+        for _ in 0..MAX_STEPS {
+            let p = from + step * share;
+            let Some((grove, block)) = self.blocks[block_of(leaf)] else { break };
+            let (distance, cone) = grove.nearest(self.solid, block, &p);
+            if distance > -EXACT {
+                break;
+            }
+            let Some(exit) = self.solid.distances[cone as usize].exit(&from, &step) else { break };
+            share = exit;
+            leaf = self.leaf_of(&step, share);
+            if self.is_alone(cone, leaf, step.norm_squared(), share) {
+                break;
+            }
+        }
+        share
+    }
+
+    /// The leaf of a place at a share of the edge.
+    #[inline(always)]
+    fn leaf_of(&self, step: &Vector3<f64>, share: f64) -> u32 {
+        if self.start.leaf == self.end.leaf {
+            return self.start.leaf;
+        }
+        self.points.leaf_of(&(self.start.position + step * share))
+    }
+
+    /// Whether no other cone than `cone` contains the place in `leaf` at a share of the edge, the square of whose length
+    /// is `square`: as an end in that leaf knows of which it decides, and from which all others are further.
+    #[inline(always)]
+    fn is_alone(&self, cone: u32, leaf: u32, square: f64, share: f64) -> bool {
+        [(&self.start, share), (&self.end, 1.0 - share)].into_iter().any(|(end, share)| {
+            let others = f64::from(end.others) * self.solid.lattice.cube;
+            end.leaf == leaf && end.cone == cone && others > 0.0 && share * share * square < others * others
+        })
+    }
 }
 
 #[cfg(test)]

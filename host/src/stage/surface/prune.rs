@@ -1,9 +1,9 @@
-//! Which cones may be the nearest one somewhere in a region.
+//! Which cones may decide somewhere in a region where the surface is.
 //!
-//! A cone is nowhere the nearest if another, the rival, is nearer in the whole region, and that follows from
-//! what is known in the middle of the region in three ways. With d the distances there, g their gradients,
-//! h the reach of the region, w the way from the middle, and R how far the middle is from the centre of the
-//! rival's ball that decides there:
+//! One that does not touch the region cannot. Nor can one that is nowhere the nearest, since another, the rival,
+//! is nearer in the whole region, and that follows from what is known in the middle of the region in three ways.
+//! With d the distances there, g their gradients, h the reach of the region, w the way from the middle, and R how
+//! far the middle is from the centre of the rival's ball that decides there:
 //!
 //! * distances change by at most the way: d - d' > 2 h;
 //! * a cone is convex, and so is the distance to it: it is nowhere below its tangent, and the rival's is at
@@ -14,6 +14,7 @@
 //!   another closely.
 
 use super::{
+    block::EDGE,
     bundle::{Bundle, Group, ROUNDING, nearest_ball},
     lanes::{LANES, Lanes, Vectors, all, dot, less, plus},
 };
@@ -37,13 +38,6 @@ pub(super) struct Answer {
     beaten: Lanes,
 }
 
-/// What the distance is in the middle of a region, in cubes, and the cone that decides it.
-#[derive(Clone, Copy)]
-pub(super) struct Middle {
-    pub(super) distance: f32,
-    pub(super) nearest: u32,
-}
-
 /// The ball of a cone that decides the distance of the middle of the region.
 #[derive(Clone, Copy)]
 struct Rival {
@@ -62,26 +56,21 @@ pub(super) struct Around {
     pub(super) reach: f32,
 }
 
-/// Appends to `kept` the cones of `bundle` that may be the nearest somewhere in a region; nothing if the
-/// surface passes nowhere within `margin` cubes of it. `answers` is room to work in.
-pub(super) fn prune(
-    bundle: &Bundle,
-    around: Around,
-    margin: f32,
-    answers: &mut Vec<Answer>,
-    kept: &mut Vec<u32>,
-) -> Middle {
+/// Appends to `kept` the cones of `bundle` that come within [`EDGE`] of a region and may be the nearest somewhere in
+/// it; nothing if the surface passes nowhere so near. `answers` is room to work in.
+pub(super) fn prune(bundle: &Bundle, around: Around, answers: &mut Vec<Answer>, kept: &mut Vec<u32>) {
     let offset = all(around.offset);
     answers.clear();
     answers.extend(bundle.groups.iter().map(|group| ask(group, offset)));
     let first = place_of_least(answers, |answer| answer.distance);
     let rival = rival(answers, first);
-    let middle = Middle { distance: rival.distance, nearest: bundle.cones[first] };
-    if middle.distance.abs() > around.reach + margin + ROUNDING * (rival.from_centre + around.reach) {
-        return middle;
+    if rival.distance.abs() > around.reach + EDGE + ROUNDING * (rival.from_centre + around.reach) {
+        return;
     }
+    let touching = Lanes::splat(around.reach + EDGE);
     for answer in &mut *answers {
-        answer.beaten = by_distance(answer, rival, around.reach);
+        let apart = answer.distance - touching - answer.from_centre * Lanes::splat(ROUNDING);
+        answer.beaten = by_distance(answer, rival, around.reach).fast_max(apart);
     }
     if bundle.cones.len() > LANES {
         let compare = |answers: &mut [Answer], rival: Rival| {
@@ -107,7 +96,6 @@ pub(super) fn prune(
         let beaten = Lanes::ZERO.simd_lt(answer.beaten).to_bitmask();
         kept.extend(cones.iter().enumerate().filter(|&(i, _)| beaten >> i & 1 == 0).map(|(_, &cone)| cone));
     }
-    middle
 }
 
 /// What the cones of a group answer about a point.

@@ -4,17 +4,21 @@ use super::{Entry, Kernel, Scope, step};
 use crate::images::Image;
 use host::wide;
 use shared::arena::Arena;
-use shared::bitmap::Word;
+use shared::bitmap::{Bitmap, Size, Word};
+use shared::limits::CapacityError;
 use shared::pack::{pack, unpack};
 use shared::stage::distance::{Parabola, distance, scratch_parabolas};
 use shared::stage::parallel_thinning::{self, Parallel, Thin};
 use shared::stage::sequential_thinning::{self, scratch_order};
 
+/// From bytes to a bitmap.
+type Pack = for<'w> fn(Size, &[u8], &'w mut [Word]) -> Result<Bitmap<'w>, CapacityError>;
+
 /// The ways to run the parallel rules that this machine has, by their registers.
-fn widths() -> impl Iterator<Item = (String, Thin)> {
-    let wider = wide::widths().into_iter().filter_map(|(name, thin)| Some((name, thin?)));
-    let named = |(name, thin): (&str, Thin)| (name.to_lowercase().replace('-', ""), thin);
-    [("u64", parallel_thinning::thin as Thin)].into_iter().chain(wider).map(named)
+fn widths() -> impl Iterator<Item = (String, Pack, Thin)> {
+    let wider = wide::widths().into_iter().filter_map(|(name, thin)| Some((name, wide::pack as Pack, thin?)));
+    let named = |(name, pack, thin): (&str, Pack, Thin)| (name.to_lowercase().replace('-', ""), pack, thin);
+    [("u64", pack as Pack, parallel_thinning::thin as Thin)].into_iter().chain(wider).map(named)
 }
 
 pub(super) fn entries() -> Vec<Entry> {
@@ -25,9 +29,9 @@ pub(super) fn entries() -> Vec<Entry> {
         ("hit_or_miss", Parallel::HitOrMiss),
     ];
     for (name, rule) in rules {
-        for (width, thin) in widths() {
+        for (width, pack, thin) in widths() {
             let name = format!("{name}/{width}");
-            entries.push(Entry::new(&name, Scope::Kernel, move |image| by_layers(image, rule, thin)));
+            entries.push(Entry::new(&name, Scope::Kernel, move |image| by_layers(image, rule, (pack, thin))));
         }
     }
     entries.push(Entry::new("edt_ordered", Scope::Kernel, by_distance));
@@ -57,7 +61,7 @@ impl Memory {
     }
 }
 
-fn by_layers(image: &Image, rule: Parallel, thin: Thin) -> Box<dyn Kernel> {
+fn by_layers(image: &Image, rule: Parallel, (pack, thin): (Pack, Thin)) -> Box<dyn Kernel> {
     let (size, mask) = (image.size(), image.mask_bytes());
     step(
         Memory::of(image),
