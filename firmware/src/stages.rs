@@ -63,8 +63,9 @@ impl<C: Counter, F: FnMut(Record)> Stages<C, F> {
         Self { counter, since, report }
     }
 
-    /// The run has ended with these samples of the left eye's curves.
+    /// The run has ended with these samples of the left eye's curves, which are of another run if it was refused.
     pub fn ended(&mut self, outcome: &Result<Outcome, Finding>, samples: &[Sample]) {
+        let samples = if outcome.is_ok() { samples } else { &[] };
         self.report(None, "outcome", |sum| write!(sum, "{outcome:?}{samples:?}"));
     }
 

@@ -40,6 +40,7 @@ pub mod geometry;
 pub mod export;
 pub mod report;
 pub mod output;
+mod unfinished;
 pub mod live;
 
 // What the user asks for.

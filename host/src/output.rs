@@ -11,8 +11,8 @@
 //!
 //! Lengths are millimetres in the left camera's axes. Everything is made in a temporary folder inside the
 //! target and moved only when all of it is complete; when something fails before that, the target is left
-//! as it was. Files are moved one after the other: if the system refuses one of these moves, those before it
-//! are new and the rest old. A page and pictures of an earlier run that this one did not make are removed, so
+//! as it was. Files are moved one after the other: if the system refuses one of these moves, or the run is killed
+//! between them, those before it are new and the rest old. A page and pictures of an earlier run that this one did not make are removed, so
 //! that a folder speaks of one run, and all of them when a pair is refused (`clear`); files of other names are not
 //! touched.
 
@@ -21,6 +21,7 @@ use crate::export::ply;
 use crate::reconstruct::Reconstruction;
 use crate::report::page::{self, Content};
 use crate::report::{Refused, Run, numbers, pictures};
+use crate::unfinished::{self, sweep};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{GrayImage, RgbImage};
 use rayon::prelude::*;
@@ -44,6 +45,7 @@ const HEAD: u64 = 1024;
 /// [`ExportError`] with the file or folder that could not be written.
 pub fn write(folder: &Path, run: &Run<'_>, page: bool) -> Result<Vec<u8>, ExportError> {
     let created = create(folder)?;
+    sweep(folder);
     let result = write_into(folder, run, page);
     if result.is_err() {
         for folder in created.iter().rev() {
@@ -60,6 +62,7 @@ pub fn write(folder: &Path, run: &Run<'_>, page: bool) -> Result<Vec<u8>, Export
 /// As [`write()`].
 pub fn write_refused(folder: &Path, refused: &Refused<'_>) -> Result<PathBuf, ExportError> {
     create(folder)?;
+    sweep(folder);
     let path = folder.join(PAGE);
     write_together(&[(&path, Content::refused(refused, &title(folder)).html().into_bytes())])?;
     Ok(path)
@@ -89,6 +92,7 @@ pub(crate) fn clear(folder: &Path) -> Result<(), ExportError> {
             std::fs::remove_file(&path).map_err(|source| failed(&path, source))?;
         }
     }
+    sweep(folder);
     for folder in [&folder.join(PICTURES), folder] {
         // What still holds files stays.
         let _ = std::fs::remove_dir(folder);
@@ -112,13 +116,7 @@ pub(crate) fn beside(path: &Path, bytes: &[u8]) -> io::Result<NamedTempFile> {
     if path.exists() && !path.is_file() {
         return Err(io::Error::other("what has that name is no file"));
     }
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".unfinished-");
-    // A temporary file is private; a picture is as readable as any other file.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(folder)?;
+    let mut file = unfinished::beside(path)?;
     file.write_all(bytes)?;
     Ok(file)
 }
@@ -137,10 +135,7 @@ fn failed(path: &Path, source: io::Error) -> ExportError {
 }
 
 fn write_into(folder: &Path, run: &Run<'_>, page: bool) -> Result<Vec<u8>, ExportError> {
-    let staged = tempfile::Builder::new()
-        .prefix(".unfinished-")
-        .tempdir_in(folder)
-        .map_err(|source| failed(folder, source))?;
+    let staged = unfinished::Folder::within(folder).map_err(|source| failed(folder, source))?;
     let stage = Stage { folder, staged: staged.path() };
     let mut names = stage.models(run.reconstruction)?;
     // Only a mesh that could be written is sound enough to be measured.

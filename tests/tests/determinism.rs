@@ -1,29 +1,23 @@
-//! The same input gives the same bits: twice, on one thread and on several, in debug and in release, and
-//! on every machine, for which a checksum of one small case is frozen here.
+//! The same input gives the same bits: twice, on one thread and on several, in any memory, by any kernels, in debug and
+//! in release, and on every machine, for which checksums of one small case and of generated pairs are frozen here.
 //!
 //! `REGENERATE=1 cargo test -p system-tests --test determinism` writes the checksums anew.
 
-use host::reconstruct::{Mode, Options, Reconstruction};
+use host::reconstruct::{Mode, Options};
 use host::shape::Shape;
 use oracle::core::{Core, Picture};
+use oracle::generated::case;
 use oracle::scene::{Pair, drawn_pair, model, pair};
+use oracle::sums::{Bench, checksum, mesh_checksum};
 use shared::fixed::PX;
 use shared::pipeline::Settings;
 use shared::stage::correspond::PaperMatching;
 use shared::stage::depth::Optics;
 use std::fmt::Write as _;
+use std::path::Path;
 
-/// FNV-1a, 64 bits.
-fn checksum(bytes: impl IntoIterator<Item = u8>) -> u64 {
-    bytes.into_iter().fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(b)).wrapping_mul(0x100_0000_01b3))
-}
-
-fn mesh_checksum(model: &Reconstruction) -> u64 {
-    let vertices =
-        model.mesh.vertices.iter().flat_map(|p| [p.x, p.y, p.z]).flat_map(|x| x.to_bits().to_le_bytes());
-    let faces = model.mesh.faces.iter().flatten().flat_map(|i| i.to_le_bytes());
-    checksum(vertices.chain(faces))
-}
+/// Generated pairs.
+const GENERATED: u64 = 150;
 
 /// A wrench: a ring, a bar and a fork, in small, at a disparity that grows downwards.
 fn wrench() -> Pair {
@@ -44,7 +38,7 @@ fn two_runs_and_any_number_of_threads_agree() {
         let run = |threads: usize, pair: &Pair| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             let model = pool.install(|| model(pair, &options).unwrap());
-            (mesh_checksum(&model), model.outcome)
+            (mesh_checksum(&model.mesh), model.outcome)
         };
         for pair in [wrench(), pair(Shape::Block, 2)] {
             let first = run(1, &pair);
@@ -86,12 +80,34 @@ fn debug_and_release_and_every_machine_agree() {
     for ((name, mode), settings) in MODES.into_iter().zip(settings) {
         let model = model(&pair, &Options { mode, ..Options::default() }).unwrap();
         let _ = writeln!(found, "{name} core {:016x}", core_checksum(&pair, &settings));
-        let _ = writeln!(found, "{name} mesh {:016x}", mesh_checksum(&model));
+        let _ = writeln!(found, "{name} mesh {:016x}", mesh_checksum(&model.mesh));
     }
-    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/frozen/determinism.txt");
+    assert_frozen("determinism.txt", &found);
+}
+
+/// Generated pairs, a few of those that `trials same` goes through.
+#[test]
+fn generated_pairs_give_the_same_on_every_way_and_every_machine() {
+    let mut bench = Bench::default();
+    let mut found = String::new();
+    for number in 0..GENERATED {
+        let _ = writeln!(found, "{number} {}", bench.sums(&case(number)));
+    }
+    assert!(
+        bench.models * 4 > GENERATED && bench.short > 0,
+        "{} models, {} short",
+        bench.models,
+        bench.short
+    );
+    assert_frozen("generated.txt", &found);
+}
+
+/// Holds text against a frozen file, or freezes it.
+#[track_caller]
+fn assert_frozen(name: &str, found: &str) {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("frozen").join(name);
     if std::env::var_os("REGENERATE").is_some() {
-        std::fs::create_dir_all(concat!(env!("CARGO_MANIFEST_DIR"), "/frozen")).unwrap();
-        std::fs::write(file, &found).unwrap();
+        std::fs::write(&file, found).unwrap();
     }
     let frozen = std::fs::read_to_string(file).unwrap_or_default();
     assert_eq!(found, frozen, "changed on purpose? REGENERATE=1 freezes what is found");

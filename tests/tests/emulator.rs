@@ -7,13 +7,11 @@
 //! take one picture after the other in the memory that the firmware has. Says loudly when QEMU is not there,
 //! and fails then if `CI=true`. With `-- --nocapture` it also says what each stage costs.
 
-use firmware::stages::Stages;
-use image::GrayImage;
 use oracle::board;
-use oracle::core::{Core, Picture};
+use oracle::core::Core;
 use oracle::emulated::{self, Case, LARGEST, Line, Raw, sizes};
+use oracle::sums::on_the_pc;
 use rayon::prelude::*;
-use shared::pipeline::Side;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::LazyLock;
@@ -35,29 +33,6 @@ fn all_cases() -> Vec<Case> {
         all.extend(two.flat_map(|raw| Case::both_ways(&format!("case {name}"), &raw)));
     }
     all
-}
-
-/// What the PC makes of a case: a line a stage.
-fn on_the_pc(case: &Case) -> Vec<String> {
-    let rows = |image: &GrayImage| -> Picture {
-        image.as_raw().chunks(image.width() as usize).map(<[u8]>::to_vec).collect()
-    };
-    let [left, right] = case.pair.each_ref().map(rows);
-    let mut lines = Vec::new();
-    let mut samples = Vec::new();
-    // A device does not look at the right eye's skeleton.
-    let skeleton =
-        |side, stage| side == Some(Side::Right) && ["distance", "skeleton", "graph"].contains(&stage);
-    let mut stages = Stages::new((), |record| {
-        if !skeleton(record.side, record.stage) {
-            lines.push(record.to_string());
-        }
-    });
-    let outcome = Core::default().run([&left, &right], &case.settings(), "", &mut stages, |memory, _| {
-        samples.extend_from_slice(memory.eyes[0].samples);
-    });
-    stages.ended(&outcome, &samples);
-    lines
 }
 
 /// Mean cost of each stage, in thousands of instructions, over the shapes.
@@ -97,7 +72,7 @@ fn held_against_the_pc(machine: &str) {
     static BENCH: LazyLock<Option<Bench>> = LazyLock::new(|| {
         let image = board::build("stages", "mps2")?;
         let cases = all_cases();
-        let expected = cases.par_iter().map(on_the_pc).collect();
+        let expected = cases.par_iter().map(|case| on_the_pc(&mut Core::default(), case)).collect();
         Some((image, cases, expected))
     });
     let Some((image, cases, expected)) = &*BENCH else { return };

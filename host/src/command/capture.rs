@@ -14,7 +14,7 @@
 //! outline without counterpart. --record keeps every pair that was worked on; `host replay` makes the same
 //! models of it, byte for byte, unless something was set on a live page in between; with --only-record it
 //! makes none, and needs no calibration. --background first takes the first pair for the scene without the
-//! object.
+//! object. --wait goes on with a camera that was unplugged when it is back, whatever its node is then.
 //!
 //! --view shows each pair on a page in the browser as it is made, where threshold, polarity, region and exposure can be
 //! set for the next one; models are then written only if --out is given. docs/live.md tells more.
@@ -34,6 +34,7 @@ mod session;
 mod telling;
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use clap::ValueEnum;
 use clap::builder::ArgPredicate;
@@ -50,6 +51,7 @@ use crate::source::v4l::kernel::Kernel;
 use crate::source::v4l::layout::Layout;
 use crate::source::v4l::live::Optics;
 use crate::source::v4l::pair::Pairs;
+use crate::source::v4l::watch::Wait;
 use session::{Rig, Session};
 
 /// Longest side of a frame that is asked for, px.
@@ -97,6 +99,9 @@ pub struct Args {
     /// Pairs thrown away at the start
     #[arg(long, value_name = "N", default_value_t = 5)]
     skip: u64,
+    /// Wait so many seconds for a camera that was unplugged, wherever it is plugged in again [default: end at once]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    wait: Option<u32>,
     /// Make one model, of the best pair
     #[arg(long, conflicts_with = "view")]
     best: bool,
@@ -227,7 +232,9 @@ fn open(args: &Args, layout: Option<Layout>) -> Result<Rig<Kernel>, Failure> {
     let formats = cameras().map(Kernel::format).collect();
     let dials = if args.view.is_wanted() { cameras().filter_map(Kernel::dial).collect() } else { Vec::new() };
     let optics = Optics { formats, layout, swap };
-    Ok(Rig { pairs: Pairs::of(first, second), optics, calibration, file, dials })
+    let most = Duration::from_secs(args.wait.unwrap_or(0).into());
+    let pairs = Pairs::of(first, second).waiting(Wait { most, tell: note });
+    Ok(Rig { pairs, optics, calibration, file, dials })
 }
 
 /// What a camera was set to.

@@ -31,6 +31,7 @@ use crate::curves::spline::Spline;
 use crate::export;
 use crate::geometry::Geometry;
 use crate::mesh::read::read_geometry;
+use crate::unfinished::{folder_of, sweep};
 
 /// Arguments of `convert`.
 #[derive(Debug, clap::Args)]
@@ -51,6 +52,7 @@ pub struct Args {
 /// If the input cannot be read, or the output cannot hold it or be written.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let input = if args.input.is_dir() { result(&args.input, &args.output) } else { args.input.clone() };
+    sweep(folder_of(&args.output));
     let (kind, (points, number), (elements, many)) = if export::has_extension(&input, "json") {
         let curves = splines(&input)?;
         export::write_splines(&args.output, &curves)?;

@@ -59,6 +59,18 @@ impl From<Refusal> for NoModel {
 }
 
 impl Place<'_> {
+    /// Why there is no model of a pair. That of an earlier one must not stand for it.
+    pub(super) fn cleared(&self, failure: impl Into<Failure>) -> Failure {
+        let failure = failure.into();
+        match self.folder.map_or(Ok(()), output::clear) {
+            Ok(()) => failure,
+            Err(error) => {
+                format!("{}; files of an earlier model stay: {}", words_of(&*failure), words_of(&error))
+                    .into()
+            }
+        }
+    }
+
     /// That a pair is refused, with a page about it if that is wanted. The model of an earlier one must not stand for
     /// it.
     fn refused(&self, options: &Options, record: &Record, refusal: Refusal) -> NoModel {

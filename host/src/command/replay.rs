@@ -262,8 +262,8 @@ fn attempt(
     workspace: &mut Workspace,
     view: Option<&mut View>,
 ) -> Result<Success, Failure> {
-    let start = Instant::now();
-    let mut views = pair.load()?;
+    let (start, place) = (Instant::now(), Place { folder, report: args.json, page: args.report });
+    let mut views = pair.load().map_err(|error| place.cleared(error))?;
     if args.swap {
         views.images.reverse();
     }
@@ -271,8 +271,9 @@ fn attempt(
     let make = || {
         let (calibration, file) = args.cameras.of(pair, &images[0])?;
         let pictures = view.is_some().then(|| images.clone());
-        let (images, calibration) = scene.apply(images, &calibration)?;
-        let (loading, place) = (start.elapsed(), Place { folder, report: args.json, page: args.report });
+        let applied = scene.apply(images, &calibration);
+        let (images, calibration) = applied.map_err(|error| place.cleared(error))?;
+        let loading = start.elapsed();
         if args.as_device {
             let model = model::make_as_device(images, &calibration, options, place, workspace)?;
             return Ok((loading, model, file));

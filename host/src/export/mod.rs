@@ -24,6 +24,7 @@ use thiserror::Error;
 
 use crate::curves::spline::Spline;
 use crate::geometry::Geometry;
+use crate::unfinished;
 
 /// The axes of everything but [`glb`].
 const AXES: &str = "left camera: x right, y down, z forward";
@@ -107,13 +108,7 @@ pub(crate) fn write_whole(
     write: impl FnOnce(&mut BufWriter<&mut tempfile::NamedTempFile>) -> io::Result<()>,
 ) -> Result<(), ExportError> {
     let failed = |source| ExportError::Io { path: path.to_path_buf(), source };
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".unfinished-");
-    // A temporary file is private; an export is as readable as any other file.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(folder).map_err(failed)?;
+    let mut file = unfinished::beside(path).map_err(failed)?;
     let mut buffered = BufWriter::new(&mut file);
     write(&mut buffered).and_then(|()| buffered.flush()).map_err(failed)?;
     drop(buffered);

@@ -12,6 +12,7 @@ use image::{GrayImage, ImageFormat};
 use crate::calibration::{CalibrationError, StereoCamera};
 use crate::export::ExportError;
 use crate::output::write_together;
+use crate::unfinished::sweep;
 
 /// Why pairs are not recorded.
 #[derive(Debug, thiserror::Error)]
@@ -59,6 +60,7 @@ impl Recording {
     ) -> Result<Self, RecordError> {
         let path = || folder.to_path_buf();
         let failed = |source| RecordError::Folder { path: path(), source };
+        sweep(folder);
         if folder.exists() && std::fs::read_dir(folder).map_err(failed)?.next().is_some() {
             return Err(RecordError::NotEmpty { path: path() });
         }

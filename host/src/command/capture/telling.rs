@@ -66,6 +66,7 @@ impl Session<'_> {
             ("damaged", count(tally.damaged as usize, "frame", "frames")),
             ("broken", count(losses.broken as usize, "frame", "frames")),
             ("stalled", count(losses.stalls as usize, "time", "times")),
+            ("came back", count(losses.returns as usize, "time", "times")),
         ] {
             if !number.starts_with("0 ") {
                 table.row(what, &number);
@@ -121,6 +122,7 @@ impl Session<'_> {
             "damaged_frames": tally.damaged,
             "broken_frames": losses.broken,
             "stalls": losses.stalls,
+            "returns": losses.returns,
             "error": failure.map(|failure| words_of(&**failure)),
         })
     }

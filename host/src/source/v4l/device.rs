@@ -47,6 +47,10 @@ pub trait Device {
     /// [`io::ErrorKind::TimedOut`] if none came in time and [`io::ErrorKind::Interrupted`] if a signal came
     /// first, after both of which the device has to be started anew; else the system's, with its number.
     fn next(&mut self, patience: Duration) -> io::Result<Frame>;
+
+    /// Lets go of a device that was unplugged and looks for it wherever it may have been plugged in again. If it is
+    /// there, it is set as it was and has to be started; its path may be another.
+    fn find_again(&mut self) -> bool;
 }
 
 /// Time since some moment that is the same for all devices.

@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use v4l::buffer::{Flags, Metadata, Type};
-use v4l::capability::Flags as Capability;
+use v4l::capability::{Capabilities, Flags as Capability};
 use v4l::control::{Control, Value};
 use v4l::format::FourCC;
 use v4l::fraction::Fraction;
@@ -36,6 +36,7 @@ use super::device::{Device, Frame, now};
 use super::dial::{Controls, Dial};
 use super::errors::{CameraError, Doing, errno};
 use super::format::{Format, FourCc};
+use super::identity::{Identity, SYSTEM};
 
 /// Frames that the kernel may fill while one is held.
 const BUFFERS: u32 = 4;
@@ -45,7 +46,11 @@ const READABLE: i16 = 1;
 /// A camera of the kernel.
 pub struct Kernel {
     camera: Camera,
-    device: v4l::Device,
+    identity: Identity,
+    /// None while it is unplugged: a node that somebody holds is not given back.
+    device: Option<v4l::Device>,
+    /// What it was set to.
+    choice: Option<Choice>,
     stream: Option<Stream<'static>>,
     format: Format,
     period: Option<Duration>,
@@ -61,20 +66,12 @@ impl Kernel {
         let system = |doing| move |error: io::Error| CameraError::system(path, doing, &error);
         let device = v4l::Device::with_path(path).map_err(system(Doing::Open))?;
         let can = device.query_caps().map_err(system(Doing::Query))?;
-        let what = if can.capabilities.contains(Capability::VIDEO_CAPTURE_MPLANE) {
-            Some("its pictures come in several planes, which are not read")
-        } else if !can.capabilities.contains(Capability::VIDEO_CAPTURE) {
-            Some("it has no video capture capability")
-        } else if !can.capabilities.contains(Capability::STREAMING) {
-            Some("it cannot stream")
-        } else {
-            None
-        };
-        if let Some(what) = what {
+        if let Some(what) = lacks(&can) {
             return Err(CameraError::NotACamera { path: path.into(), what });
         }
         let current = device.format().map_err(system(Doing::Query))?;
         let format = ours(&current);
+        let identity = identity(path, &can);
         let camera = Camera {
             path: path.into(),
             name: can.card,
@@ -83,7 +80,7 @@ impl Kernel {
             offers: offered(&device),
             current: (format.code, (format.width, format.height)),
         };
-        Ok(Self { camera, device, stream: None, format, period: None })
+        Ok(Self { camera, identity, device: Some(device), choice: None, stream: None, format, period: None })
     }
 
     /// What it says of itself.
@@ -101,8 +98,9 @@ impl Kernel {
         let path = &self.camera.path;
         let (width, height) = choice.size;
         let asked = v4l::Format::new(width, height, FourCC::new(&choice.code.0));
-        let got = self.device.set_format(&asked);
-        self.format = ours(&got.map_err(|error| CameraError::system(path, Doing::Set, &error))?);
+        let refused = |error| CameraError::system(path, Doing::Set, &error);
+        let device = plugged(self.device.as_ref()).map_err(refused)?;
+        self.format = ours(&device.set_format(&asked).map_err(refused)?);
         let wanted = Format { code: choice.code, width, height, stride: self.format.stride };
         if self.format != wanted {
             let (path, offers) = (path.clone(), offers(&self.camera));
@@ -110,10 +108,10 @@ impl Kernel {
         }
         if let Some(rate) = choice.rate {
             // Drivers take the nearest that they have, and those without rates refuse: neither is a failure.
-            let _ =
-                self.device.set_params(&Parameters::new(Fraction::new(1000, (1e3 * rate).round() as u32)));
+            let _ = device.set_params(&Parameters::new(Fraction::new(1000, (1e3 * rate).round() as u32)));
         }
-        self.period = self.device.params().ok().and_then(|params| seconds(params.interval));
+        self.period = device.params().ok().and_then(|params| seconds(params.interval));
+        self.choice = Some(*choice);
         Ok(())
     }
 
@@ -157,7 +155,8 @@ impl Device for Kernel {
 
     fn start(&mut self) -> io::Result<()> {
         end(self.stream.take());
-        let mut stream = Stream::with_buffers(&self.device, Type::VideoCapture, BUFFERS)?;
+        let device = plugged(self.device.as_ref())?;
+        let mut stream = Stream::with_buffers(device, Type::VideoCapture, BUFFERS)?;
         let started = queue(&mut stream).and_then(|()| stream.start());
         if started.is_ok() {
             self.stream = Some(stream);
@@ -174,12 +173,49 @@ impl Device for Kernel {
         let (bytes, about) = CaptureStream::next(stream)?;
         Ok(frame(bytes, about))
     }
+
+    fn find_again(&mut self) -> bool {
+        end(self.stream.take());
+        self.device = None;
+        let look = |path: PathBuf| {
+            let can = v4l::Device::with_path(&path).ok()?.query_caps().ok()?;
+            lacks(&can).is_none().then(|| (identity(&path, &can), path))
+        };
+        let (there, paths): (Vec<_>, Vec<_>) = nodes().into_iter().filter_map(look).unzip();
+        let Some(place) = self.identity.find(&there) else { return false };
+        // One that has just come may not be ready yet, and is looked for again.
+        let opened = Self::open(&paths[place])
+            .and_then(|mut found| self.choice.map_or(Ok(()), |choice| found.set(&choice)).map(|()| found));
+        opened.map(|found| *self = found).is_ok()
+    }
 }
 
 impl Drop for Kernel {
     fn drop(&mut self) {
         end(self.stream.take());
     }
+}
+
+/// The device, unless it is unplugged.
+fn plugged(device: Option<&v4l::Device>) -> io::Result<&v4l::Device> {
+    device.ok_or_else(|| io::Error::from_raw_os_error(errno::ENODEV))
+}
+
+/// Why a node is no camera that can be read; nothing if it is one.
+fn lacks(can: &Capabilities) -> Option<&'static str> {
+    if can.capabilities.contains(Capability::VIDEO_CAPTURE_MPLANE) {
+        Some("its pictures come in several planes, which are not read")
+    } else if !can.capabilities.contains(Capability::VIDEO_CAPTURE) {
+        Some("it has no video capture capability")
+    } else if !can.capabilities.contains(Capability::STREAMING) {
+        Some("it cannot stream")
+    } else {
+        None
+    }
+}
+
+fn identity(path: &Path, can: &Capabilities) -> Identity {
+    Identity::of(path, (can.card.clone(), can.bus.clone()), Path::new(SYSTEM))
 }
 
 /// Hands the kernel all buffers but the first, which follows when the first frame is taken. A driver may have
@@ -279,13 +315,8 @@ fn seconds(fraction: Fraction) -> Option<Duration> {
     is_time.then(|| Duration::from_secs_f64(f64::from(numerator) / f64::from(denominator)))
 }
 
-/// Every camera of this machine, in the order of its numbers, or why it cannot be asked. Nodes that are no
-/// cameras are left out.
-///
-/// # Errors
-///
-/// None here; where there is no Video4Linux, that.
-pub fn list() -> Result<Vec<Result<Camera, CameraError>>, CameraError> {
+/// The nodes of video devices, in the order of their numbers.
+fn nodes() -> Vec<PathBuf> {
     let entries = fs::read_dir("/dev").into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path()));
     let numbered = |path: PathBuf| {
         let number: u32 = path.file_name()?.to_str()?.strip_prefix("video")?.parse().ok()?;
@@ -293,10 +324,20 @@ pub fn list() -> Result<Vec<Result<Camera, CameraError>>, CameraError> {
     };
     let mut nodes: Vec<(u32, PathBuf)> = entries.filter_map(numbered).collect();
     nodes.sort();
-    let ask = |(_, path): (u32, PathBuf)| match Kernel::open(&path) {
+    nodes.into_iter().map(|(_, path)| path).collect()
+}
+
+/// Every camera of this machine, in the order of its numbers, or why it cannot be asked. Nodes that are no
+/// cameras are left out.
+///
+/// # Errors
+///
+/// None here; where there is no Video4Linux, that.
+pub fn list() -> Result<Vec<Result<Camera, CameraError>>, CameraError> {
+    let ask = |path: PathBuf| match Kernel::open(&path) {
         Ok(kernel) => Some(Ok(kernel.camera().clone())),
         Err(CameraError::NotACamera { .. }) => None,
         Err(error) => Some(Err(error)),
     };
-    Ok(nodes.into_iter().filter_map(ask).collect())
+    Ok(nodes().into_iter().filter_map(ask).collect())
 }

@@ -1,8 +1,8 @@
 //! Stereo pairs from cameras that Linux knows: Video4Linux.
 //!
 //! ```text
-//! kernel (or a simulated device) -> watch: stalls restarted, broken frames left out -> pair: one frame that
-//!     holds both eyes, or two that belong together -> live: the newest pair waits, older ones are dropped
+//! kernel (or a simulated device) -> watch: stalls restarted, broken frames left out, one that was unplugged
+//!     waited for -> pair: one frame that holds both eyes, or two that belong together -> live: the newest pair waits, older ones are dropped
 //!     -> layout and format: grey views
 //! ```
 //!
@@ -15,6 +15,7 @@ pub mod device;
 pub mod dial;
 pub mod errors;
 pub mod format;
+pub mod identity;
 #[cfg(target_os = "linux")]
 pub mod kernel;
 #[cfg(not(target_os = "linux"))]
@@ -23,7 +24,7 @@ pub mod kernel;
 pub mod layout;
 pub mod live;
 pub mod pair;
-mod watch;
+pub mod watch;
 
 #[cfg(test)]
 pub(crate) mod simulated;

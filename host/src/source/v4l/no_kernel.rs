@@ -66,6 +66,10 @@ impl Device for Kernel {
     fn next(&mut self, _patience: Duration) -> io::Result<Frame> {
         match *self {}
     }
+
+    fn find_again(&mut self) -> bool {
+        match *self {}
+    }
 }
 
 /// The cameras of this system.

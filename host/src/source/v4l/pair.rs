@@ -13,7 +13,7 @@ use std::time::Duration;
 
 use super::device::{Device, Frame};
 use super::errors::CameraError;
-use super::watch::Watched;
+use super::watch::{Wait, Watched};
 
 /// The period until a camera has shown or said its own.
 const USUAL_PERIOD: Duration = Duration::from_millis(33);
@@ -40,6 +40,8 @@ pub struct Losses {
     pub broken: u64,
     /// Frames of one camera without one of the other.
     pub unpaired: u64,
+    /// Times that a camera was unplugged and came back.
+    pub returns: u64,
 }
 
 /// One camera, or two.
@@ -95,6 +97,15 @@ impl<D: Device> Pairs<D> {
         Self { first: Eye::of(first), right: right.map(Eye::of), unpaired: 0 }
     }
 
+    /// The same, of cameras that are waited for when they are unplugged.
+    #[must_use]
+    pub fn waiting(mut self, wait: Wait) -> Self {
+        for eye in [Some(&mut self.first), self.right.as_mut()].into_iter().flatten() {
+            eye.camera.wait = wait;
+        }
+        self
+    }
+
     /// The camera, or the left one.
     pub fn path(&self) -> &Path {
         self.first.camera.device.path()
@@ -108,6 +119,7 @@ impl<D: Device> Pairs<D> {
             stalls: cameras().map(|camera| camera.stalls).sum(),
             broken: cameras().map(|camera| camera.broken).sum(),
             unpaired: self.unpaired,
+            returns: cameras().map(|camera| camera.returns).sum(),
         }
     }
 
@@ -226,7 +238,7 @@ mod tests {
         let mut pairs = Pairs::of(Simulated::grey("a", script), None);
         let shot = pairs.next(&GO).unwrap().unwrap();
         assert_eq!((shot.frames.len(), shot.gap), (1, None));
-        assert_eq!(pairs.losses(), Losses { stalls: 1, broken: 1, unpaired: 0 });
+        assert_eq!(pairs.losses(), Losses { stalls: 1, broken: 1, ..Losses::default() });
         assert!(pairs.next(&GO).unwrap_err().to_string().contains("unplugged"));
     }
 }

@@ -25,6 +25,8 @@ pub(crate) enum Event {
     Error(i32),
     /// The next start fails by this number.
     RefuseStart(i32),
+    /// It is unplugged, looked for in vain so often, and then found under this path.
+    Unplugged(u32, &'static str),
 }
 
 impl Event {
@@ -72,6 +74,10 @@ impl Simulated {
         Self::new(path, Format { code: FourCc(*b"GREY"), width: 4, height: 2, stride: 4 }, script)
     }
 
+    fn is_unplugged(&self) -> bool {
+        matches!(self.script.front(), Some(Event::Unplugged(..)))
+    }
+
     fn frame(&mut self, ms: u64, bytes: Vec<u8>, broken: bool) -> Frame {
         std::thread::sleep(self.pace);
         self.sequence += 1;
@@ -95,6 +101,9 @@ impl Device for Simulated {
 
     fn start(&mut self) -> io::Result<()> {
         self.starts += 1;
+        if self.is_unplugged() {
+            return Err(io::Error::from_raw_os_error(errno::ENODEV));
+        }
         if let Some(Event::RefuseStart(code)) = self.script.front() {
             let code = *code;
             self.script.pop_front();
@@ -107,6 +116,9 @@ impl Device for Simulated {
     fn next(&mut self, patience: Duration) -> io::Result<Frame> {
         if !self.running {
             return Err(io::Error::from_raw_os_error(errno::EINVAL));
+        }
+        if self.is_unplugged() {
+            return Err(io::Error::from_raw_os_error(errno::ENODEV));
         }
         match self.script.pop_front() {
             Some(Event::Frame(ms, bytes)) => Ok(self.frame(ms, bytes, false)),
@@ -121,10 +133,26 @@ impl Device for Simulated {
                 Err(ErrorKind::Interrupted.into())
             }
             Some(Event::Error(code) | Event::RefuseStart(code)) => Err(io::Error::from_raw_os_error(code)),
-            None => {
+            Some(Event::Unplugged(..)) | None => {
                 std::thread::sleep(self.pace);
                 Err(io::Error::from_raw_os_error(errno::ENODEV))
             }
+        }
+    }
+
+    fn find_again(&mut self) -> bool {
+        self.running = false;
+        match self.script.front_mut() {
+            Some(Event::Unplugged(0, path)) => {
+                self.path = (*path).into();
+                self.script.pop_front();
+                true
+            }
+            Some(Event::Unplugged(looks, _)) => {
+                *looks -= 1;
+                false
+            }
+            _ => false,
         }
     }
 }

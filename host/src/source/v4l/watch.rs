@@ -1,12 +1,13 @@
-//! A device that is kept going: a stalled one is started anew, and frames that its driver calls broken are
-//! left out. Both are counted.
+//! A device that is kept going: a stalled one is started anew, frames that its driver calls broken are left out, and
+//! one that was unplugged is waited for. All are counted.
 
 use std::io::ErrorKind;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::thread;
+use std::time::{Duration, Instant};
 
 use super::device::{Device, Frame};
-use super::errors::{CameraError, Doing};
+use super::errors::{CameraError, Doing, is_gone};
 
 /// The least time that a frame is waited for: an exposure in the dark takes some tenths of a second. A camera
 /// that is pulled out meanwhile is noticed when it is started anew, so within two seconds.
@@ -15,6 +16,22 @@ const PATIENCE: Duration = Duration::from_secs(1);
 const PERIODS: u32 = 4;
 /// Starts in a row without a frame after which a camera is given up.
 const MOST_STARTS: u32 = 5;
+/// From one look for a camera that was unplugged to the next.
+const LOOK_AGAIN: Duration = Duration::from_millis(250);
+
+/// Whether a camera that was unplugged is waited for.
+#[derive(Clone, Copy, Debug)]
+pub struct Wait {
+    /// How long at most.
+    pub most: Duration,
+    /// Who hears that it is gone, and that it is back.
+    pub tell: fn(&str),
+}
+
+impl Wait {
+    /// It is not.
+    pub const NOT: Self = Self { most: Duration::ZERO, tell: |_| () };
+}
 
 /// A device and what has happened to it.
 #[derive(Debug)]
@@ -24,12 +41,15 @@ pub(super) struct Watched<D> {
     pub(super) stalls: u64,
     /// Frames that its driver called broken.
     pub(super) broken: u64,
+    /// How often it was unplugged and found again.
+    pub(super) returns: u64,
+    pub(super) wait: Wait,
     running: bool,
 }
 
 impl<D: Device> Watched<D> {
     pub(super) fn new(device: D) -> Self {
-        Self { device, stalls: 0, broken: 0, running: false }
+        Self { device, stalls: 0, broken: 0, returns: 0, wait: Wait::NOT, running: false }
     }
 
     /// The next good frame; nothing once `stop` is set.
@@ -38,7 +58,10 @@ impl<D: Device> Watched<D> {
         let mut silent = 0;
         while !stop.load(Ordering::Relaxed) {
             if !self.running {
-                self.device.start().map_err(|error| self.refused(Doing::Start, &error))?;
+                if let Err(error) = self.device.start() {
+                    self.survive(Doing::Start, &error, stop)?;
+                    continue;
+                }
                 self.running = true;
             }
             match self.device.next(patience) {
@@ -54,14 +77,44 @@ impl<D: Device> Watched<D> {
                         return Err(CameraError::Silent { path, waited: silent * patience, times: silent });
                     }
                 }
-                Err(error) => return Err(self.refused(Doing::Read, &error)),
+                Err(error) => self.survive(Doing::Read, &error, stop)?,
             }
         }
         Ok(None)
     }
 
-    fn refused(&self, doing: Doing, error: &std::io::Error) -> CameraError {
-        CameraError::system(self.device.path(), doing, error)
+    /// Waits for a camera that was unplugged until it is back or `stop` is set. What else is wrong with it, or that it
+    /// stays away, is an error.
+    fn survive(
+        &mut self,
+        doing: Doing,
+        error: &std::io::Error,
+        stop: &AtomicBool,
+    ) -> Result<(), CameraError> {
+        let refused = CameraError::system(self.device.path(), doing, error);
+        if self.wait.most.is_zero() || !error.raw_os_error().is_some_and(is_gone) {
+            return Err(refused);
+        }
+        self.running = false;
+        let (path, gone) = (self.device.path().display().to_string(), Instant::now());
+        let mut told = false;
+        while !stop.load(Ordering::Relaxed) {
+            thread::sleep(LOOK_AGAIN);
+            if self.device.find_again() {
+                self.returns += 1;
+                (self.wait.tell)(&format!("{path} is back as {}", self.device.path().display()));
+                return Ok(());
+            }
+            if !told {
+                let most = self.wait.most.as_secs();
+                (self.wait.tell)(&format!("{path} has been unplugged; waiting for it, {most} s at most"));
+                told = true;
+            }
+            if gone.elapsed() >= self.wait.most {
+                return Err(refused);
+            }
+        }
+        Ok(())
     }
 }
 
@@ -70,6 +123,7 @@ mod tests {
     use super::super::errors::errno;
     use super::super::simulated::{Event, Simulated};
     use super::*;
+    use std::path::Path;
 
     fn watched(script: Vec<Event>) -> Watched<Simulated> {
         Watched::new(Simulated::grey("/dev/video0", script))
@@ -117,6 +171,36 @@ mod tests {
         let mut camera = watched(vec![Event::RefuseStart(errno::ENOSPC)]);
         let error = camera.next(&GO).unwrap_err().to_string();
         assert!(error.contains("bandwidth") && error.contains("MJPG"), "{error}");
+    }
+
+    #[test]
+    fn a_camera_that_comes_back_under_another_node_goes_on() {
+        let away = Event::Unplugged(2, "/dev/video4");
+        let mut camera =
+            watched(vec![Event::frame(0, 1), away.clone(), Event::frame(40, 2), away, Event::frame(80, 3)]);
+        camera.wait.most = Duration::from_secs(60);
+        for grey in 1..=3 {
+            assert_eq!(camera.next(&GO).unwrap().unwrap().bytes[0], grey);
+        }
+        assert_eq!((camera.returns, camera.device.starts), (2, 3));
+        assert_eq!(camera.device.path(), Path::new("/dev/video4"));
+    }
+
+    #[test]
+    fn a_camera_that_stays_away_is_given_up_in_time_and_a_stop_ends_the_waiting() {
+        for code in [errno::ENODEV, errno::EIO] {
+            let mut camera = watched(vec![Event::Error(code)]);
+            camera.wait.most = Duration::from_millis(300);
+            let begun = Instant::now();
+            let error = camera.next(&GO).unwrap_err().to_string();
+            assert!(error.starts_with("/dev/video0 does not hand over a frame"), "{error}");
+            assert!(begun.elapsed() < Duration::from_secs(2) && camera.returns == 0);
+        }
+        static STOP: AtomicBool = AtomicBool::new(false);
+        let mut camera = watched(Vec::new());
+        // Whoever hears that it is gone stops.
+        camera.wait = Wait { most: Duration::from_secs(60), tell: |_| STOP.store(true, Ordering::Relaxed) };
+        assert_eq!(camera.next(&STOP).unwrap(), None);
     }
 
     #[test]

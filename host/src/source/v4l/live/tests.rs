@@ -1,7 +1,9 @@
 use super::super::errors::errno;
 use super::super::format::FourCc;
 use super::super::simulated::{Event, Simulated};
+use super::super::watch::Wait;
 use super::*;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 const PACE: Duration = Duration::from_millis(5);
@@ -53,6 +55,21 @@ fn a_camera_pulled_out_ends_with_a_sentence_and_soon() {
     assert!(
         !seen.is_empty() && tally.fetched == seen.len() as u64 && begun.elapsed() < Duration::from_secs(2)
     );
+}
+
+#[test]
+fn a_camera_that_comes_back_is_gone_on_with() {
+    let script = [frames(20), vec![Event::Unplugged(1, "/dev/video4")], frames(200)].concat();
+    let mut pairs =
+        Pairs::of(camera(script), None).waiting(Wait { most: Duration::from_secs(60), tell: |_| () });
+    let mut after = 0;
+    let (tally, result) =
+        run(&mut pairs, &optics(Layout::SideBySide), &AtomicBool::new(false), |_, tally| {
+            after += u32::from(tally.losses.returns == 1);
+            if after < 3 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        });
+    assert!(result.is_ok() && tally.fetched > 3, "{tally:?}");
+    assert_eq!(pairs.path(), Path::new("/dev/video4"));
 }
 
 #[test]
