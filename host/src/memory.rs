@@ -1,6 +1,6 @@
 //! The memory that the core's pipeline borrows, allocated once for the largest size of image.
 
-use shared::bitmap::{Size, Word};
+use shared::bitmap::{Bitmap, Size, Word};
 use shared::limits::CapacityError;
 use shared::pipeline::{Branch, EyeMemory, Memory, scratch_words};
 use shared::point::PixelPoint;
@@ -114,6 +114,15 @@ impl Storage {
     /// The size it is for.
     pub const fn size(&self) -> Size {
         self.size
+    }
+
+    /// The masks that the last run has left, left and right.
+    ///
+    /// # Errors
+    /// None after a run: the memory fits its images.
+    pub fn masks(&mut self) -> Result<[Bitmap<'_>; 2], CapacityError> {
+        let [left, right] = &mut self.eyes;
+        Ok([Bitmap::over(self.size, &mut left.mask)?, Bitmap::over(self.size, &mut right.mask)?])
     }
 
     /// Lend it to a run of the pipeline.

@@ -2,7 +2,7 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `model.ply` | the solid's closed surface |
+//! | `model.ply` | the solid's closed surface, with `confidence` where its front was measured |
 //! | `skeleton.ply` | its curve skeleton: points with `radius`, mm, and edges |
 //! | `boundary.ply` | its boundary as seen from the left: points and edges |
 //! | `report.json` | every figure ([`crate::report::numbers`]) |
@@ -167,7 +167,9 @@ impl Stage<'_> {
     /// The surface, the skeleton and the boundary.
     fn models(&self, made: &Reconstruction) -> Result<Vec<String>, ExportError> {
         let comments = ["Ossature", "unit mm", "axes of the left camera: x right, y down, z forward"];
-        self.named("model.ply", |path| ply::write_mesh(path, &made.mesh, &comments))?;
+        let confidence = made.front.as_ref().map(|front| [("confidence", &front.confidence[..])]);
+        let known = confidence.as_ref().map_or(&[][..], |known| known);
+        self.named("model.ply", |path| ply::write_known_mesh(path, &made.mesh, known, &comments))?;
         for (name, curves) in [("skeleton.ply", &made.skeleton), ("boundary.ply", &made.boundary)] {
             self.named(name, |path| ply::write_curves(path, curves, &comments))?;
         }

@@ -4,7 +4,7 @@
 //! images + calibration -> rectified pair -> core (shared::pipeline) -> its memory
 //!                   a device's shape off the wire -> resumed there -> its memory
 //! its memory -> balls, refined, smoothed, radii from viewing rays (grow) -> round cones -> surface
-//!     -> left camera's axes
+//!     -> the visible side where both eyes see it (front, on request) -> left camera's axes
 //! ```
 
 mod device;
@@ -15,12 +15,13 @@ mod workspace;
 
 pub use device::{describe, optics};
 pub(crate) use options::settings;
-pub use options::{Mode, Options, Pieces, Profile, Radius, Skeleton};
+pub use options::{Front, Mode, Options, Pieces, Profile, Radius, Skeleton};
 pub use workspace::Workspace;
 
 use crate::calibration::StereoCamera;
 use crate::curves::Curves;
 use crate::mesh::Mesh;
+use crate::stage::front::Measured;
 use crate::stage::rectify::{RectifiedCamera, RectifyError};
 use crate::stage::surface::SurfaceError;
 use grow::Growth;
@@ -36,6 +37,8 @@ use std::time::{Duration, Instant};
 pub struct Reconstruction {
     /// The solid's surface, left camera's axes, mm.
     pub mesh: Mesh,
+    /// What was measured of its visible side, if that was asked for.
+    pub front: Option<Measured>,
     /// Its curve skeleton with radii.
     pub skeleton: Curves,
     /// Its boundary as seen from the left.

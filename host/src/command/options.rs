@@ -11,7 +11,7 @@ use shared::stage::thinning::Rule;
 
 use super::{Failure, line, words_of};
 use crate::calibration::StereoCamera;
-use crate::reconstruct::{self, Options, Pieces, Profile, Radius, Skeleton};
+use crate::reconstruct::{self, Front, Options, Pieces, Profile, Radius, Skeleton};
 use crate::report::words::{parse_polarity, parse_rule, parse_threshold};
 use crate::source::scene::{self, BackgroundError, Known, Region, Scene};
 use crate::source::{Layout, Pair};
@@ -50,6 +50,10 @@ pub struct MethodArgs {
     /// Prune the skeleton to so many branches, instead of by what stands out
     #[arg(long, value_name = "N")]
     branches: Option<u16>,
+    /// The visible side: from balls, from the grey levels of both images, or from these where they are to be
+    /// trusted [default: balls]
+    #[arg(long, value_enum, hide_possible_values = true, value_name = "balls|grey|auto")]
+    front: Option<Front>,
     #[command(flatten)]
     grow: GrowArgs,
 }
@@ -97,6 +101,11 @@ impl MethodArgs {
                 "--mode paper, --thinning and --branches are nothing that a device can be told",
             ));
         }
+        if self.front.is_some_and(|front| front != Front::Balls) {
+            return Err(usage(
+                "--front grey and auto need both images, and a device sends none; leave --front out",
+            ));
+        }
         let device = self.grow.device_options();
         Ok(Options {
             profile: self.profile.unwrap_or(device.profile),
@@ -132,6 +141,7 @@ impl MethodArgs {
             branches: self.branches,
             radius: grow.radius.unwrap_or_default(),
             pieces: grow.surface.unwrap_or_default(),
+            front: self.front.unwrap_or_default(),
             threshold: self.threshold,
             polarity: self.polarity,
             cell: grow.resolution,

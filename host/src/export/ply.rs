@@ -1,8 +1,7 @@
 //! PLY files (G. Turk, "The PLY Polygon File Format", 1994), binary little-endian.
 //!
-//! A mesh has `element vertex` with float32 `x y z` and `element face` with an int32 list
-//! `vertex_indices`; points have float32 `x y z`, then one float32 property a scalar, and `element edge`
-//! with int32 `vertex1 vertex2` where they are a curve.
+//! Vertices have float32 `x y z`, then one float32 property a scalar. A mesh has `element face` with an int32 list
+//! `vertex_indices`; points have `element edge` with int32 `vertex1 vertex2` where they are a curve.
 
 use std::{
     io::{self, Write},
@@ -18,13 +17,16 @@ use crate::mesh::Mesh;
 /// So many vertices or faces are written at once: what stays in the cache until the system has copied it.
 const RECORDS: usize = 4096;
 
+/// Named values, one a point, in units that the name's reader knows (a `radius` is in mm).
+pub type Scalars<'a> = &'a [(&'a str, &'a [f64])];
+
 /// Points with what is known at each, and the edges between them if they are a curve.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Points<'a> {
     /// Positions, mm.
     pub positions: &'a [Point3<f64>],
-    /// Named values, one a point, in units that the name's reader knows (a `radius` is in mm).
-    pub scalars: &'a [(&'a str, &'a [f64])],
+    /// What is known.
+    pub scalars: Scalars<'a>,
     /// Pairs of indices into `positions`.
     pub edges: &'a [[u32; 2]],
 }
@@ -36,18 +38,36 @@ pub struct Points<'a> {
 /// If the file cannot be written, or has more than 2^31 - 1 vertices or faces, or a comment has a line
 /// break.
 pub fn write_mesh(path: &Path, mesh: &Mesh, comments: &[&str]) -> Result<(), ExportError> {
+    write_known_mesh(path, mesh, &[], comments)
+}
+
+/// Writes a mesh with what is known at each vertex. `comments` go to the header, a line each.
+///
+/// # Errors
+///
+/// As [`write_mesh`] and [`write_points`].
+pub fn write_known_mesh(
+    path: &Path,
+    mesh: &Mesh,
+    scalars: Scalars<'_>,
+    comments: &[&str],
+) -> Result<(), ExportError> {
     let counts = [("vertices", mesh.vertices.len()), ("faces", mesh.faces.len())];
     check(path, comments, &counts, mesh.faces.as_flattened(), mesh.vertices.len())?;
+    check_scalars(path, scalars, mesh.vertices.len())?;
     write_whole(path, |file| {
-        begin(file, comments, mesh.vertices.len())?;
+        begin(file, comments, mesh.vertices.len(), scalars)?;
         writeln!(file, "element face {}", mesh.faces.len())?;
         writeln!(file, "property list uchar int vertex_indices\nend_header")?;
         let mut records = Vec::new();
-        for vertices in mesh.vertices.chunks(RECORDS) {
+        for (chunk, vertices) in mesh.vertices.chunks(RECORDS).enumerate() {
             records.clear();
-            for vertex in vertices {
+            for (k, vertex) in vertices.iter().enumerate() {
                 let record = [vertex.x, vertex.y, vertex.z].map(|x| (x as f32).to_le_bytes());
                 records.extend_from_slice(record.as_flattened());
+                for (_, values) in scalars {
+                    records.extend_from_slice(&(values[chunk * RECORDS + k] as f32).to_le_bytes());
+                }
             }
             file.write_all(&records)?;
         }
@@ -73,18 +93,9 @@ pub fn write_points(path: &Path, points: &Points, comments: &[&str]) -> Result<(
     let count = points.positions.len();
     let counts = [("points", count), ("edges", points.edges.len())];
     check(path, comments, &counts, points.edges.as_flattened(), count)?;
-    for (name, values) in points.scalars {
-        let one_word = !name.is_empty() && name.chars().all(|c| c.is_ascii_graphic());
-        if !one_word || values.len() != count {
-            let what = format!("the scalar \"{name}\" is not one word with {count} values");
-            return Err(ExportError::Content { path: path.to_path_buf(), what });
-        }
-    }
+    check_scalars(path, points.scalars, count)?;
     write_whole(path, |file| {
-        begin(file, comments, count)?;
-        for (name, _) in points.scalars {
-            writeln!(file, "property float {name}")?;
-        }
+        begin(file, comments, count, points.scalars)?;
         if !points.edges.is_empty() {
             writeln!(file, "element edge {}", points.edges.len())?;
             writeln!(file, "property int vertex1\nproperty int vertex2")?;
@@ -133,12 +144,25 @@ fn check(
     Ok(())
 }
 
-fn begin(file: &mut impl Write, comments: &[&str], vertices: usize) -> io::Result<()> {
+/// Refuses scalars whose names are not one word or whose values are not one a vertex.
+fn check_scalars(path: &Path, scalars: Scalars<'_>, vertices: usize) -> Result<(), ExportError> {
+    for (name, values) in scalars {
+        let one_word = !name.is_empty() && name.chars().all(|c| c.is_ascii_graphic());
+        if !one_word || values.len() != vertices {
+            let what = format!("the scalar \"{name}\" is not one word with {vertices} values");
+            return Err(ExportError::Content { path: path.to_path_buf(), what });
+        }
+    }
+    Ok(())
+}
+
+fn begin(file: &mut impl Write, comments: &[&str], vertices: usize, scalars: Scalars<'_>) -> io::Result<()> {
     writeln!(file, "ply\nformat binary_little_endian 1.0")?;
     for comment in comments {
         writeln!(file, "comment {comment}")?;
     }
-    writeln!(file, "element vertex {vertices}\nproperty float x\nproperty float y\nproperty float z")
+    writeln!(file, "element vertex {vertices}\nproperty float x\nproperty float y\nproperty float z")?;
+    scalars.iter().try_for_each(|(name, _)| writeln!(file, "property float {name}"))
 }
 
 fn floats<'a>(file: &mut impl Write, values: impl Iterator<Item = &'a f64>) -> io::Result<()> {
@@ -170,6 +194,24 @@ mod tests {
         let mut expected = triangle();
         expected.vertices[2].z = f64::from(1e-3_f32);
         assert_eq!(read(&path).unwrap(), expected);
+    }
+
+    #[test]
+    fn what_is_known_of_vertices_stands_behind_their_places() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mesh.ply");
+        let known = [("confidence", &[0.25, 0.5, 1.0][..])];
+        write_known_mesh(&path, &triangle(), &known, &[]).unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        let end = b"end_header\n";
+        let header = bytes.windows(end.len()).position(|w| w == end).unwrap();
+        let text = std::str::from_utf8(&bytes[..header]).unwrap();
+        assert!(text.contains("property float z\nproperty float confidence\nelement face 2\n"), "{text}");
+        let first: Vec<f32> =
+            bytes[header + end.len()..][..16].as_chunks().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
+        assert_eq!(first, [0.0, 0.5, 1.0, 0.25]);
+        assert_eq!(read(&path).unwrap().faces, triangle().faces);
+        assert!(write_known_mesh(&path, &triangle(), &[("confidence", &[1.0])], &[]).is_err());
     }
 
     #[test]

@@ -60,6 +60,19 @@ pub enum Pieces {
     Balls,
 }
 
+/// Where the visible side of the solid comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Front {
+    /// Balls, whose cross-sections are round.
+    #[default]
+    Balls,
+    /// Where the grey levels of both eyes agree.
+    Grey,
+    /// The grey levels where they are to be trusted, balls elsewhere.
+    Auto,
+}
+
 /// How much is made of the pictures.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -88,6 +101,8 @@ pub struct Options {
     pub radius: Radius,
     /// What the solid is made of (default mode).
     pub pieces: Pieces,
+    /// Where the visible side comes from; of a device's shape, which has no grey levels, always from balls.
+    pub front: Front,
     /// Level between object and background.
     pub threshold: binarise::Threshold,
     /// Whether the object is bright or dark.

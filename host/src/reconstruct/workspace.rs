@@ -2,11 +2,12 @@
 
 use super::grow::Described;
 use super::options::{core_settings, settings};
-use super::{Clock, Growth, Mode, Options, Reconstruction, Refusal, grey, optics};
+use super::{Clock, Front, Growth, Mode, Options, Reconstruction, Refusal, grey, optics};
 use crate::calibration::StereoCamera;
 use crate::memory::Storage;
 use crate::mesh::Mesh;
 use crate::mesh::body::Bodies;
+use crate::stage::front::{self, Sight};
 use crate::stage::rectify::{PixelBox, Rectification, RectifiedCamera, RectifyError};
 use crate::stage::surface::{Mesher, RoundCone};
 use image::GrayImage;
@@ -66,7 +67,11 @@ impl Workspace {
         observer: &mut impl Observer,
     ) -> Result<Reconstruction, Refusal> {
         let solid = self.solid(views, calibration, options, observer)?;
-        self.finish(solid, options)
+        let resampled = take(&mut self.images);
+        let images = if solid.resampled { resampled.each_ref() } else { views };
+        let made = self.finish(solid, Some(images), options);
+        self.images = resampled;
+        made
     }
 
     /// As [`reconstruct_shape`](super::reconstruct_shape).
@@ -86,7 +91,7 @@ impl Workspace {
         self.clock.lap("core");
         let solid = Solid { outcome, camera: model.into(), resampled: model.eyes.is_some() };
         grow(&mut self.growth, memory, &solid, options, &mut self.clock)?;
-        self.finish(solid, options)
+        self.finish(solid, None, options)
     }
 
     /// The solid of a pair, without its surface.
@@ -124,8 +129,14 @@ impl Workspace {
         self.clock.laps = made.times;
     }
 
-    /// From the solid to its surface, and everything to the left camera's axes.
-    fn finish(&mut self, solid: Solid, options: &Options) -> Result<Reconstruction, Refusal> {
+    /// From the solid to its surface, and everything to the left camera's axes. The rectified images are those of
+    /// a pair whose masks are still in the core's memory.
+    fn finish(
+        &mut self,
+        solid: Solid,
+        images: Option<[&GrayImage; 2]>,
+        options: &Options,
+    ) -> Result<Reconstruction, Refusal> {
         let Solid { outcome, camera, resampled } = solid;
         let cones = &self.growth.cones;
         self.radii.clone_from(&self.growth.skeleton.radii);
@@ -134,6 +145,17 @@ impl Workspace {
         self.mesher.surface(cones, cell, &mut self.mesh)?;
         let dropped = self.bodies.keep_largest(&mut self.mesh);
         self.clock.lap("surface");
+        let measured = match (options.front, images) {
+            (Front::Balls, _) | (_, None) => None,
+            (_, Some(images)) => {
+                let masks = self.storage.masks().map_err(Finding::from)?;
+                let rows = f64::from(outcome.vertical_offset) / 256.0;
+                let sight = Sight { images, masks, camera: &camera, rows };
+                let measured = front::measure(&mut self.mesh, &sight, options.front == Front::Auto);
+                self.clock.lap("front");
+                Some(measured)
+            }
+        };
         let turned = |points: &mut [Point3<f64>]| {
             points.iter_mut().for_each(|point| *point = camera.to_left_camera(*point));
         };
@@ -142,6 +164,7 @@ impl Workspace {
         turned(&mut self.mesh.vertices);
         Ok(Reconstruction {
             mesh: take(&mut self.mesh),
+            front: measured,
             skeleton: take(&mut self.growth.skeleton),
             boundary: take(&mut self.growth.boundary),
             outcome,

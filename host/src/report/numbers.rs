@@ -7,6 +7,7 @@
 mod choices;
 mod curves;
 mod eye;
+mod front;
 mod matching;
 
 use super::times::{Part, stages};
@@ -16,6 +17,7 @@ use crate::reconstruct::{Mode, Refusal};
 use choices::{Calibration, Choices, Images};
 use curves::Curve;
 use eye::EyeFigures;
+use front::Front;
 use matching::Matching;
 use serde::Serialize;
 use shared::pipeline::{Finding, Side};
@@ -38,6 +40,8 @@ struct Report {
     /// Everything the user should know about the input.
     gates: Vec<Gate>,
     model: Model,
+    /// What of it was measured, and what is inferred.
+    front: Front,
     /// The compact description: the skeleton's branches as NURBS.
     curves: Eyes<Vec<Curve>>,
     /// Those of the left view in space; `null` in paper mode, which describes each view by itself.
@@ -175,6 +179,7 @@ pub fn json(run: &Run<'_>) -> Vec<u8> {
         matching: Matching::of(run),
         gates: run.reconstruction.outcome.findings.iter().map(Gate::of).collect(),
         model: Model::of(run),
+        front: Front::of(run),
         curves: Eyes::of([Curve::all(&eyes[0].parts), Curve::all(&eyes[1].parts)]),
         curves_mm: (run.options.mode == Mode::Default).then(|| splines(run)),
         times_ms: Times::of(run),

@@ -9,3 +9,4 @@ pub mod solid;
 pub mod simplify;
 pub mod triangulate;
 pub mod surface;
+pub mod front;

@@ -14,6 +14,7 @@ pub mod image;
 pub mod images;
 pub mod kernels;
 pub mod link;
+pub mod looks;
 pub mod matching;
 pub mod mesh_checker;
 pub mod nurbs;

@@ -2,7 +2,7 @@
 
 use super::super::{Run, words};
 use crate::calibration::Camera;
-use crate::reconstruct::{Mode, Pieces, Profile, Radius, Skeleton, settings};
+use crate::reconstruct::{Front, Mode, Pieces, Profile, Radius, Skeleton, settings};
 use crate::source::scene::Region;
 use crate::stage::balls::px;
 use serde::Serialize;
@@ -38,6 +38,8 @@ pub(super) struct Choices {
     radius: Option<Radius>,
     /// What the solid is made of, in default mode.
     surface: Option<Pieces>,
+    /// Where its visible side comes from.
+    front: Front,
     curve_spacing_px: f64,
     curve_smoothing: f64,
     curve_end_weight: i32,
@@ -85,6 +87,7 @@ impl Choices {
             skeleton: omega.is_none().then_some(run.options.skeleton),
             radius: omega.is_none().then_some(run.options.radius),
             surface: omega.is_none().then_some(run.options.pieces),
+            front: run.options.front,
             curve_spacing_px: px(chosen.curves.spacing),
             curve_smoothing: share(chosen.curves.smoothing),
             curve_end_weight: chosen.curves.end_weight,

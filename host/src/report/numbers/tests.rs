@@ -16,11 +16,16 @@ fn names(value: &Value) -> Vec<&str> {
 fn the_fields_are_these() {
     let report = report(Mode::Default);
     let top = ["format", "format_version", "version", "options", "images", "calibration", "eyes", "matching"];
-    assert_eq!(names(&report), [&top[..], &["gates", "model", "curves", "curves_mm", "times_ms"]].concat());
+    assert_eq!(
+        names(&report),
+        [&top[..], &["gates", "model", "front", "curves", "curves_mm", "times_ms"]].concat()
+    );
     let matching = ["right_area_over_left", "vertical_offset", "invariants", "disparity", "rows", "paper"];
     assert_eq!(names(&report["matching"]), matching);
     assert_eq!(report["options"]["mode"], "default");
     assert_eq!(report["options"]["thinning"], "edt");
+    assert_eq!(report["options"]["front"], "balls");
+    assert!(report["front"]["grey"].is_null() && report["front"]["measured"] == "the outline, by both eyes");
     assert_eq!(report["matching"]["invariants"]["e_omega"].as_array().map(Vec::len), Some(12));
     assert_eq!(report["calibration"]["baseline_mm"], 60.0);
     assert_eq!(report["eyes"]["left"]["contour_loops"], 1);

@@ -66,11 +66,12 @@ const lines = (l, color, width) => ({
 // What can be seen in space: whether it is at first, and how it is drawn.
 function traces({ model, truth, skeleton, boundary }) {
   const all = [{ name: "model", shown: true, trace: surface(model, { color: style("--model") }) }];
-  if (model.error) {
-    const [intensity, cmax] = model.error;
-    const colorbar = { title: { text: "error, mm" }, thickness: 12, len: 0.8, x: 1, xanchor: "right" };
-    all.push({ name: "error", title: "error in colour", trace: surface(model, { intensity, cmin: 0, cmax, colorscale: "Viridis", colorbar }) });
-  }
+  const coloured = (name, text, intensity, cmax) => {
+    const colorbar = { title: { text }, thickness: 12, len: 0.8, x: 1, xanchor: "right" };
+    all.push({ name, title: name + " in colour", trace: surface(model, { intensity, cmin: 0, cmax, colorscale: "Viridis", colorbar }) });
+  };
+  if (model.error) coloured("error", "error, mm", ...model.error);
+  if (model.confidence) coloured("confidence", "confidence", model.confidence, 1);
   if (truth) all.push({ name: "truth", trace: surface(truth, { color: style("--truth"), opacity: 0.4 }) });
   all.push({ name: "skeleton", trace: lines(skeleton, style("--skeleton"), 6) });
   all.push({ name: "boundary", shown: true, trace: lines(boundary, style("--boundary"), 4) });
@@ -95,10 +96,11 @@ function drawSpace({ space }) {
   const all = traces(space);
   switches(byId("traces"), all, () => drawSpace({ space }));
   const on = shown(byId("traces"));
-  // The model in one colour would lie in the same place as the one coloured by its error, and hides what is within.
-  if (on.has("error")) on.delete("model");
+  // Of models in the same place one is drawn, the last in colour if any; and it hides what is within.
+  const models = ["confidence", "error", "model"].filter((name) => on.has(name));
+  models.slice(1).forEach((name) => on.delete(name));
   const opacity = on.has("skeleton") || on.has("truth") ? 0.5 : 1;
-  for (const { name, trace } of all) if (name === "model" || name === "error") trace.opacity = opacity;
+  for (const { name, trace } of all) if (name === models[0]) trace.opacity = opacity;
   const axis = (text) => ({ title: { text }, gridcolor: style("--line"), zeroline: false, color: style("--faint"), showbackground: false });
   const layout = {
     scene: { aspectmode: "data", xaxis: axis("x, mm"), yaxis: axis("y, mm"), zaxis: axis("z, mm"), camera: eyes() ?? camera(-0.45, -0.4, -1) },

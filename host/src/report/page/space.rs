@@ -48,10 +48,12 @@ struct Surface {
     k: Bulk,
     /// Distance of each vertex from the truth, mm, where that is known, and what all but one in a hundred keep below.
     error: Option<(Bulk, f64)>,
+    /// How well each vertex is known, 0 to 1, where its front was measured.
+    confidence: Option<Bulk>,
 }
 
 impl Surface {
-    fn of(mesh: &Mesh, truth: Option<&Mesh>) -> Self {
+    fn of(mesh: &Mesh, truth: Option<&Mesh>, confidence: Option<&[f64]>) -> Self {
         let axis = |axis: usize| Bulk::floats(mesh.vertices.iter().map(move |p| p[axis]));
         let corner = |corner: usize| Bulk::indices(mesh.faces.iter().map(move |face| face[corner]));
         let error = truth.map(|truth| {
@@ -63,7 +65,17 @@ impl Surface {
                 order.get_mut(rank).is_some().then(|| *order.select_nth_unstable_by(rank, f64::total_cmp).1);
             (Bulk::floats(errors.into_iter()), most.unwrap_or_default())
         });
-        Self { x: axis(0), y: axis(1), z: axis(2), i: corner(0), j: corner(1), k: corner(2), error }
+        let confidence = confidence.map(|values| Bulk::floats(values.iter().copied()));
+        Self {
+            x: axis(0),
+            y: axis(1),
+            z: axis(2),
+            i: corner(0),
+            j: corner(1),
+            k: corner(2),
+            error,
+            confidence,
+        }
     }
 }
 
@@ -105,8 +117,8 @@ impl Space {
     pub(super) fn of(run: &Run<'_>) -> Self {
         let made = run.reconstruction;
         Self {
-            model: Surface::of(&made.mesh, run.truth),
-            truth: run.truth.map(|truth| Surface::of(truth, None)),
+            model: Surface::of(&made.mesh, run.truth, made.front.as_ref().map(|front| &front.confidence[..])),
+            truth: run.truth.map(|truth| Surface::of(truth, None, None)),
             skeleton: Lines::of(&made.skeleton),
             boundary: Lines::of(&made.boundary),
         }

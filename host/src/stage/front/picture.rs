@@ -1,0 +1,71 @@
+//! A grey image of the object alone: blurred without the background, and looked up between pixels.
+//!
+//! * **In**: a grey image, and the mask of the object in it.
+//! * **Out**: grey levels in a frame. A Gaussian's weights outside the mask are left out and the others scaled up, so
+//!   that the rim is not darkened; levels go on beyond the mask as far as the Gaussian reaches.
+//! * **Cost**: the frame, times the Gaussian's length.
+
+use super::raster::Frame;
+use super::system::add;
+
+/// Grey levels in a frame, row by row.
+#[derive(Clone, Debug)]
+pub(super) struct Picture {
+    pub(super) frame: Frame,
+    pub(super) levels: Vec<f64>,
+}
+
+impl Picture {
+    /// The picture seen through a Gaussian of `sigma` px, with the weights of `mask`, one a pixel.
+    pub(super) fn blurred(&self, mask: &[f64], sigma: f64) -> Self {
+        let reach = (3.0 * sigma).ceil() as usize;
+        let weights: Vec<f64> = (0..=reach).map(|x| libm::exp(-0.5 * (x as f64 / sigma).powi(2))).collect();
+        let blur = |values: Vec<f64>| {
+            along_rows(&along_columns(&values, self.frame, &weights), self.frame, &weights)
+        };
+        let levels = blur(self.levels.iter().zip(mask).map(|(level, weight)| level * weight).collect());
+        let total = blur(mask.to_vec());
+        let level = |(level, total): (&f64, &f64)| level / total.max(1e-3);
+        Self { frame: self.frame, levels: levels.iter().zip(&total).map(level).collect() }
+    }
+
+    /// The level at a place, bilinear; beyond the frame that of its border.
+    pub(super) fn at(&self, u: f64, v: f64) -> f64 {
+        let Frame { corner, width, height } = self.frame;
+        let x = (u - f64::from(corner[0])).clamp(0.0, width as f64 - 1.001);
+        let y = (v - f64::from(corner[1])).clamp(0.0, height as f64 - 1.001);
+        let (column, row) = (x as usize, y as usize);
+        let (s, t) = (x - column as f64, y - row as f64);
+        let at = |k: usize| {
+            let place = (row + k) * width + column;
+            self.levels[place] * (1.0 - s) + self.levels[place + 1] * s
+        };
+        at(0) * (1.0 - t) + at(1) * t
+    }
+}
+
+/// Convolution along rows with a symmetric kernel, of which `weights` has the middle and one side; zero outside.
+fn along_rows(values: &[f64], frame: Frame, weights: &[f64]) -> Vec<f64> {
+    let mut sums = vec![0.0; values.len()];
+    for (row, sums) in values.chunks(frame.width).zip(sums.chunks_mut(frame.width)) {
+        add(sums, row, weights[0]);
+        for (k, &weight) in weights.iter().enumerate().skip(1).take(frame.width.saturating_sub(1)) {
+            let within = frame.width - k;
+            add(&mut sums[..within], &row[k..], weight);
+            add(&mut sums[k..], &row[..within], weight);
+        }
+    }
+    sums
+}
+
+/// The same along columns.
+fn along_columns(values: &[f64], frame: Frame, weights: &[f64]) -> Vec<f64> {
+    let mut sums = vec![0.0; values.len()];
+    add(&mut sums, values, weights[0]);
+    for (k, &weight) in weights.iter().enumerate().skip(1).take(frame.height.saturating_sub(1)) {
+        let (by, within) = (k * frame.width, (frame.height - k) * frame.width);
+        add(&mut sums[..within], &values[by..], weight);
+        add(&mut sums[by..], &values[..within], weight);
+    }
+    sums
+}
