@@ -3,7 +3,8 @@
 #
 #   ./ci.sh            everything
 #   ./ci.sh NAME...    single parts: fmt lint test bench doc firmware v4l2 fuzz; qemu, which test contains; and
-#                      supply, which installs tools for minutes and is run where changes are merged; and miri
+#                      fleet, which builds the optional features, supply, which installs tools for minutes, and
+#                      miri, all three run where changes are merged
 #
 # Installs what a fresh Debian machine with rustup lacks. The last line is "N passed, N failed", counting
 # tests, and one for each check that is not made of tests. A part that ran no test fails. Exit codes: 0 all
@@ -204,6 +205,14 @@ part_miri() {
         toolchain install nightly --component miri,rust-src
     tests cargo +nightly miri test --locked -p shared --lib --target armv7-unknown-linux-gnueabihf \
         -- --skip long_division_is_division
+}
+
+# Pairs that machines make together: a queue's server, and workers that are killed.
+part_fleet() {
+    need nats-server nats-server
+    check cargo clippy -q -p host --all-targets --features batch --locked -- -D warnings
+    tests cargo test -q --release --locked -p host --features batch --test batch
+    tests cargo test -q --release --locked -p host --features batch --lib batch::
 }
 
 # Third-party code: licences, duplicates and sources (deny.toml), and what each package is made of, as

@@ -43,6 +43,10 @@ pub mod output;
 mod unfinished;
 pub mod live;
 
+// Many pairs on many machines.
+#[cfg(feature = "batch")]
+pub mod batch;
+
 // What the user asks for.
 pub mod config;
 pub mod command;

@@ -56,10 +56,15 @@ pub(crate) fn folder_of(path: &Path) -> &Path {
 
 /// Removes what killed runs left in a folder, as far as it can be removed.
 pub(crate) fn sweep(folder: &Path) {
+    sweep_older(folder, AGE);
+}
+
+/// [`sweep`], of what is older than `age`: nothing, where nobody else begins to write now.
+pub(crate) fn sweep_older(folder: &Path, age: Duration) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let path = entry.path();
         let hidden = entry.file_name().as_encoded_bytes().starts_with(PREFIX.as_bytes());
-        if !hidden || !is_abandoned(&path) {
+        if !hidden || !is_abandoned(&path, age) {
             continue;
         }
         // What stays does no harm.
@@ -67,11 +72,11 @@ pub(crate) fn sweep(folder: &Path) {
     }
 }
 
-/// Whether nobody works on it any more.
-fn is_abandoned(path: &Path) -> bool {
+/// Whether it is older than `least`, and nobody works on it any more.
+fn is_abandoned(path: &Path, least: Duration) -> bool {
     let Ok(file) = File::open(path) else { return false };
     let age = file.metadata().and_then(|about| about.modified()).map(|modified| modified.elapsed());
-    age.is_ok_and(|age| age.is_ok_and(|age| age > AGE)) && file.try_lock().is_ok()
+    age.is_ok_and(|age| age.is_ok_and(|age| age > least)) && file.try_lock().is_ok()
 }
 
 fn builder() -> Builder<'static, 'static> {

@@ -79,3 +79,13 @@ fn the_core_can_be_looked_on() {
     assert!(said.contains("both: 3 curves of 29 control points\n"), "{said}");
     assert!(said.ends_with("the median ran on 240 rows\n"), "{said}");
 }
+
+/// Eight threads without any luck, good or bad: 1,000 pairs of a second take 125 s.
+#[test]
+fn the_simulated_queue_takes_what_arithmetic_says() {
+    let flags = "--pairs 1000 --threads 8 --pair-ms 1000 --spread 0 --server-us 0 --failure-h 1e9";
+    let flags: Vec<&Path> = flags.split(' ').map(Path::new).collect();
+    let said = example("host", "queue", &flags);
+    let row: Vec<&str> = said.lines().nth(1).unwrap().split_whitespace().collect();
+    assert_eq!(row, ["8", "0.035", "8.0", "100.0", "%", "0.0", "%", "0"], "{said}");
+}

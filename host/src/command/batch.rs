@@ -1,72 +1,195 @@
-//! Many jobs on a few threads, each job undisturbed by the others.
+//! Models from more recorded pairs than one machine should make: a queue of pairs, and any number of workers.
 //!
-//! A thread that waits inside a shared pool takes up another job meanwhile, and the time of that one would
-//! count for both. So every worker here has a pool of its own, with an equal share of the threads.
+//! On one machine `host replay DIR` does the same without any of this. The queue is a NATS server with JetStream
+//! (docs/batch.md says how to start one), and this program a build with `--features batch`.
+//!
+//! submit queues every pair in DIR, once: a pair that waits or was done before, with the same contents and the same
+//! options, is passed over. What stands behind -- are the options of `host replay` that say how a model is made; it
+//! takes what stands for it in `ossature.toml`, too. Only paths are queued: workers read the pictures themselves.
+//!
+//! work makes models, one pair a core at a time, until none is left, and leaves in --out what `host replay` would,
+//! byte for byte. Start as many as there are machines; DIR is the same folder as this machine sees it. A worker may
+//! be killed at any time: its pairs go to others. A server that is away is waited for. A pair that is refused is done;
+//! one that could not be made --tries times, or whose worker ended each time, is set aside with the reason.
+//!
+//! status tells what waits, is at work, and is done, how fast, how long the rest will take, and what was refused or
+//! set aside and why. drop forgets a batch: what waits, and what was done; models stay.
+//!
+//! Examples:
+//!   host batch submit recordings -- --polarity dark --no-pictures
+//!   host batch work recordings --out models
+//!   host batch status recordings --json
+//!   host batch work recordings --out models --server tls://queue.example:4222 --creds worker.creds
 
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::thread;
+#[cfg(feature = "batch")]
+mod recipe;
+#[cfg(feature = "batch")]
+mod status;
+#[cfg(feature = "batch")]
+mod submit;
+#[cfg(feature = "batch")]
+mod work;
 
-use rayon::{ThreadPoolBuildError, ThreadPoolBuilder};
+use std::ffi::OsString;
+use std::path::PathBuf;
 
-/// Threads a core that are of any use.
-const MOST_A_CORE: usize = 4;
+use super::options::positive;
+use super::{Everywhere, Failure};
 
-/// Does the jobs 0 to `count` on `threads` threads, by default one a core, at most [`MOST_A_CORE`] a core. Each
-/// worker has a bench of its own, which a job finds as the worker's last one left it. Results in the order of the
-/// jobs.
-pub(super) fn run<B: Default + Send, T: Send>(
-    count: usize,
-    threads: Option<usize>,
-    job: &(impl Fn(&mut B, usize) -> T + Sync),
-) -> Result<Vec<T>, ThreadPoolBuildError> {
-    let cores = thread::available_parallelism().map_or(1, usize::from);
-    let threads = threads.unwrap_or_else(rayon::current_num_threads).clamp(1, MOST_A_CORE * cores);
-    let workers = threads.min(count).max(1);
-    let pools = (0..workers).map(|worker| {
-        let share = threads / workers + usize::from(worker < threads % workers);
-        ThreadPoolBuilder::new().num_threads(share).build()
-    });
-    let pools = pools.collect::<Result<Vec<_>, _>>()?;
-    let next = AtomicUsize::new(0);
-    let results = Mutex::new(Vec::with_capacity(count));
-    thread::scope(|scope| {
-        for pool in &pools {
-            scope.spawn(|| {
-                let mut bench = B::default();
-                loop {
-                    let index = next.fetch_add(1, Ordering::Relaxed);
-                    if index >= count {
-                        break;
-                    }
-                    let result = pool.install(|| job(&mut bench, index));
-                    // A lock is poisoned only by a panic, which the scope passes on.
-                    if let Ok(mut results) = results.lock() {
-                        results.push((index, result));
-                    }
-                }
-            });
-        }
-    });
-    let mut results = results.into_inner().unwrap_or_default();
-    results.sort_by_key(|&(index, _)| index);
-    Ok(results.into_iter().map(|(_, result)| result).collect())
+/// Arguments of `batch`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// What to do.
+    #[command(subcommand)]
+    pub action: Action,
+    /// Print one JSON document instead of text
+    #[arg(long, global = true)]
+    pub json: bool,
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// What to do with a batch.
+#[derive(Debug, clap::Subcommand)]
+pub enum Action {
+    /// Queue every pair of a folder
+    #[command(after_help = "Examples:\n  host batch submit recordings -- --polarity dark --no-pictures")]
+    Submit(SubmitArgs),
+    /// Make models until no pair is left
+    #[command(after_help = "Examples:\n  host batch work recordings --out models")]
+    Work(WorkArgs),
+    /// How far it is
+    #[command(after_help = "Examples:\n  host batch status recordings --json")]
+    Status(BatchArgs),
+    /// Forget it: what waits, and what was done
+    #[command(after_help = "Examples:\n  host batch drop recordings")]
+    Drop(BatchArgs),
+}
 
-    #[test]
-    fn results_come_in_order_whatever_the_threads() {
-        for threads in [None, Some(1), Some(3), Some(8), Some(65_535)] {
-            let squares = run(5, threads, &|(): &mut (), index| index * index).unwrap();
-            assert_eq!(squares, [0, 1, 4, 9, 16]);
-            assert_eq!(run(0, threads, &|(): &mut (), index| index).unwrap(), [0usize; 0]);
-            // A bench is one worker's, and each of its jobs finds it as the last one left it.
-            let count = |done: &mut usize, _| std::mem::replace(done, *done + 1);
-            let firsts = run(20, threads, &count).unwrap().into_iter().filter(|done| *done == 0).count();
-            assert!((1..=threads.unwrap_or(20)).contains(&firsts), "{firsts}");
+/// Which batch, and where its queue is.
+#[derive(Clone, Debug, clap::Args)]
+pub struct BatchArgs {
+    /// Folder with the pairs, as this machine sees it
+    #[arg(value_name = "DIR")]
+    pub folder: PathBuf,
+    /// What the batch is called [default: as the folder]
+    #[arg(long, value_name = "NAME")]
+    pub name: Option<String>,
+    /// The NATS server, with user and password where it asks for them: nats://USER:PASSWORD@HOST:PORT
+    #[arg(
+        long,
+        value_name = "URL",
+        default_value = "nats://127.0.0.1:4222",
+        env = "OSSATURE_NATS",
+        hide_env_values = true
+    )]
+    pub server: String,
+    /// Credentials for the server, as `nsc` writes them
+    #[arg(long, value_name = "FILE")]
+    pub creds: Option<PathBuf>,
+    /// Believe a server that has a certificate by this authority, and none without one
+    #[arg(long, value_name = "FILE")]
+    pub ca: Option<PathBuf>,
+    /// This machine's own certificate, for a server that asks for it
+    #[arg(long, value_name = "FILE", requires = "key")]
+    pub cert: Option<PathBuf>,
+    /// The certificate's key
+    #[arg(long, value_name = "FILE", requires = "cert")]
+    pub key: Option<PathBuf>,
+}
+
+/// Arguments of `batch submit`.
+#[derive(Debug, clap::Args)]
+pub struct SubmitArgs {
+    /// Which batch.
+    #[command(flatten)]
+    pub batch: BatchArgs,
+    /// Seconds without a sign of life after which a worker's pairs go to others
+    #[arg(long, value_name = "N", value_parser = positive, default_value_t = 30.0)]
+    pub lost_after: f64,
+    /// Options of `host replay` that say how a model is made
+    #[arg(last = true, value_name = "OPTIONS")]
+    pub how: Vec<OsString>,
+}
+
+/// Arguments of `batch work`.
+#[derive(Debug, clap::Args)]
+pub struct WorkArgs {
+    /// Which batch.
+    #[command(flatten)]
+    pub batch: BatchArgs,
+    /// Folder for the results
+    #[arg(long, value_name = "DIR", default_value = "ossature-out")]
+    pub out: PathBuf,
+    /// Threads, at most four a core [default: one a core]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub jobs: Option<u16>,
+    /// Tries after which a pair is set aside
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(i64).range(1..), default_value_t = 5)]
+    pub tries: i64,
+    /// Wait for more when none is left
+    #[arg(long)]
+    pub stay: bool,
+}
+
+/// Does it.
+///
+/// # Errors
+///
+/// A [`clap::Error`] for wrong usage; if there is no server, or the command cannot do its part.
+#[cfg(feature = "batch")]
+pub fn run(args: &Args, everywhere: &Everywhere) -> Result<(), Failure> {
+    match &args.action {
+        Action::Submit(submit) => submit::run(submit, everywhere, args.json),
+        Action::Work(work) => work::run(work, args.json),
+        Action::Status(batch) => status::run(batch, args.json),
+        Action::Drop(batch) => status::drop(batch, args.json),
+    }
+}
+
+/// Says what to do.
+///
+/// # Errors
+///
+/// Always: this build has no batches.
+#[cfg(not(feature = "batch"))]
+pub fn run(_: &Args, _: &Everywhere) -> Result<(), Failure> {
+    Err("this program was built without batches; build it with `cargo build --release -p host --features batch`, or \
+         make all pairs on this machine with `host replay DIR`"
+        .into())
+}
+
+#[cfg(feature = "batch")]
+impl BatchArgs {
+    /// The folder, if it is one.
+    fn folder(&self) -> Result<&std::path::Path, Failure> {
+        if self.folder.is_dir() {
+            return Ok(&self.folder);
+        }
+        Err(format!("there is no folder {}; name the one with the pairs", self.folder.display()).into())
+    }
+
+    /// What the batch is called: letters, digits, `-` and `_`.
+    fn name(&self) -> Result<String, Failure> {
+        let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+        if let Some(name) = &self.name {
+            let sound = !name.is_empty() && name.chars().all(is_plain);
+            return if sound {
+                Ok(name.clone())
+            } else {
+                Err(super::options::usage("--name takes letters, digits, - and _"))
+            };
+        }
+        let folder = self.folder()?.canonicalize()?;
+        let name = folder.file_name().unwrap_or_default().to_string_lossy();
+        Ok(name.chars().map(|c| if is_plain(c) { c } else { '-' }).collect())
+    }
+
+    fn server(&self) -> crate::batch::queue::Server {
+        let identity = self.cert.clone().zip(self.key.clone()).map(<[PathBuf; 2]>::from);
+        crate::batch::queue::Server {
+            url: self.server.clone(),
+            credentials: self.creds.clone(),
+            authority: self.ca.clone(),
+            identity,
         }
     }
 }

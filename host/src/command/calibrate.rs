@@ -19,7 +19,7 @@ use shared::stage::contour::ContourPoint;
 
 use super::options::CameraArgs;
 use super::table::Table;
-use super::{Failure, batch, say, say_json, told, words_of};
+use super::{Failure, crew, say, say_json, told, words_of};
 use crate::reconstruct::{Options, Refusal, reconstruct};
 use crate::report::words::{parse_polarity, parse_threshold, sentence};
 use crate::source::find::find;
@@ -72,7 +72,7 @@ struct Rows {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let measured = find(&args.check, args.layout).map_err(Failure::from).and_then(|found| {
         let pairs = found.pairs;
-        let rows = batch::run(pairs.len(), None, &|(): &mut (), index| measure(args, &pairs[index]))?;
+        let rows = crew::run(pairs.len(), None, &|(): &mut (), index| measure(args, &pairs[index]))?;
         if rows.iter().any(Result::is_ok) {
             return Ok((pairs, rows));
         }

@@ -114,7 +114,7 @@ pub fn run(args: &Args, everywhere: &Everywhere) -> Result<(), Failure> {
 }
 
 /// The program, and the configuration that it was told to read.
-fn program(everywhere: &Everywhere) -> Vec<OsString> {
+pub(super) fn program(everywhere: &Everywhere) -> Vec<OsString> {
     let mut program = vec![OsString::from("host")];
     match &everywhere.config {
         _ if everywhere.no_config => program.push("--no-config".into()),

@@ -17,7 +17,7 @@ use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Command, CommandFactory, Error, FromArgMatches, Id};
 
 use super::{Cli, words_of};
-use crate::config::{self, Config, ConfigError, Entry, Place, Table, Value};
+use crate::config::{self, Config, ConfigError, Place, Table, Value};
 pub(super) use check::{command_of, takes};
 
 /// What was typed, and what the configuration adds to it.
@@ -120,7 +120,7 @@ impl Line {
                     continue;
                 }
                 said.push(arg.get_id().clone());
-                more.extend(as_arguments(arg, entry, config.folder()));
+                more.extend(as_arguments(arg, &entry.value, config.folder()));
                 let option = format!("--{}", entry.name);
                 self.added.push(Added { id: arg.get_id().clone(), option, place: entry.place.clone() });
             }
@@ -234,8 +234,9 @@ fn contradict(command: &Command, said: &Id, arg: &Arg) -> bool {
     of(arg, said) || said_arg.is_some_and(|said| of(said, arg.get_id()))
 }
 
-/// What would have been typed for an entry. Paths start at the folder of the file.
-fn as_arguments(arg: &Arg, entry: &Entry, folder: &Path) -> Vec<OsString> {
+/// What would have been typed for a value of an option, with paths that start at a folder.
+pub(super) fn as_arguments(arg: &Arg, value: &Value, folder: &Path) -> Vec<OsString> {
+    let option = format!("--{}", arg.get_long().unwrap_or_default());
     let in_folder = |text: &String| -> OsString {
         let path = folder.join(text);
         if arg.get_value_parser().type_id() == TypeId::of::<PathBuf>() {
@@ -251,12 +252,12 @@ fn as_arguments(arg: &Arg, entry: &Entry, folder: &Path) -> Vec<OsString> {
         }
     };
     let with = |value: OsString| {
-        let mut argument = OsString::from(format!("--{}=", entry.name));
+        let mut argument = OsString::from(format!("{option}="));
         argument.push(value);
         argument
     };
-    match &entry.value {
-        Value::Switch(true) => vec![format!("--{}", entry.name).into()],
+    match value {
+        Value::Switch(true) => vec![option.into()],
         Value::Switch(false) => Vec::new(),
         Value::One(text) => vec![with(in_folder(text))],
         Value::Many(all) => all.iter().map(|text| with(in_folder(text))).collect(),

@@ -33,11 +33,12 @@ pub mod inspect;
 pub mod list_devices;
 pub mod listen;
 pub mod looks;
-mod batch;
+pub mod batch;
 mod color;
 pub mod config;
 mod connect;
 pub mod convert;
+mod crew;
 mod line;
 pub mod man;
 mod model;
@@ -108,6 +109,9 @@ enum Command {
     /// Models from recorded pairs
     #[command(long_about = page(include_str!("replay.rs")))]
     Replay(replay::Args),
+    /// Models from more recorded pairs than one machine should make
+    #[command(long_about = page(include_str!("batch.rs")))]
+    Batch(batch::Args),
     /// Models from a camera
     #[command(long_about = page(include_str!("capture.rs")))]
     Capture(capture::Args),
@@ -199,6 +203,7 @@ impl Cli {
         color::choose(self.everywhere.color);
         match &self.command {
             Command::Replay(args) => replay::run(args),
+            Command::Batch(args) => told(args.json, batch::run(args, &self.everywhere)),
             Command::Capture(args) => capture::run(args),
             Command::ListDevices(args) => told(args.json, list_devices::run(args)),
             Command::Calibrate(args) => calibrate::run(args),

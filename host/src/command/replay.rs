@@ -53,7 +53,7 @@ use super::options::{CameraArgs, MethodArgs, SceneArgs, usage};
 use super::table::Table;
 use super::timings::Timings;
 use super::view::{self, Beside, ViewArgs};
-use super::{Failure, batch, listen, note, say, say_json, shown, told, words_of};
+use super::{Failure, crew, listen, note, say, say_json, shown, told, words_of};
 use crate::live::View;
 use crate::reconstruct::{Options, Workspace};
 use crate::source::find::{Found, find};
@@ -67,10 +67,10 @@ use crate::source::{Files, Layout, Pair, Views};
 pub struct Args {
     /// LEFT RIGHT, or one image with both views, or folders or patterns of pairs
     #[arg(required = true)]
-    input: Vec<String>,
+    pub(super) input: Vec<String>,
     /// How views lie in files [default: as the number of files says]
     #[arg(long, value_enum)]
-    layout: Option<Layout>,
+    pub(super) layout: Option<Layout>,
     /// Exchange left and right
     #[arg(long)]
     swap: bool,
@@ -79,9 +79,9 @@ pub struct Args {
     #[arg(long, conflicts_with = "view")]
     as_device: bool,
     #[command(flatten)]
-    cameras: CameraArgs,
+    pub(super) cameras: CameraArgs,
     #[command(flatten)]
-    scene: SceneArgs,
+    pub(super) scene: SceneArgs,
     #[command(flatten)]
     method: MethodArgs,
     /// Threads, at most four a core [default: one a core]
@@ -115,14 +115,15 @@ pub struct Args {
 }
 
 /// What became of a pair.
-struct Done<'a> {
+pub(super) struct Done<'a> {
     pair: &'a Pair,
     /// None if it was only looked at.
     folder: Option<PathBuf>,
-    result: Result<Success, Failure>,
+    pub(super) result: Result<Success, Failure>,
 }
 
-struct Success {
+/// What is told of a pair's model.
+pub(super) struct Success {
     model: Model,
     /// For its images.
     loading: Duration,
@@ -149,15 +150,12 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         });
         return told(args.json, replayed);
     }
-    let mut options = if args.as_device { args.method.device_options() } else { args.method.options() }?;
-    let one_file = args.layout.filter(|layout| *layout != Layout::Two);
-    let mut scene = told(args.json, args.scene.scene(one_file, args.swap, &mut options))?;
+    let (options, mut scene) = told(args.json, how(args))?;
     let mut found = told(args.json, pairs(args))?;
     if args.scene.takes_first() {
         scene.background = Some(told(args.json, first(args, &mut found))?);
     }
     let mut timings = Timings::begin();
-    options.draft = args.out.is_none();
     let title = args.input.join(" ");
     let limits = || follow::limits(&args.scene);
     let view =
@@ -192,8 +190,21 @@ fn recording_options(args: &Args) -> Result<Options, Failure> {
     args.method.device_options()
 }
 
+/// How each pair is made. A background that is the first pair comes later.
+///
+/// # Errors
+///
+/// If what was chosen contradicts itself, or the background cannot be read.
+pub(super) fn how(args: &Args) -> Result<(Options, Scene), Failure> {
+    let options = if args.as_device { args.method.device_options() } else { args.method.options() }?;
+    let mut options = Options { draft: args.out.is_none(), ..options };
+    let one_file = args.layout.filter(|layout| *layout != Layout::Two);
+    let scene = args.scene.scene(one_file, args.swap, &mut options)?;
+    Ok((options, scene))
+}
+
 /// The pairs that are named.
-fn pairs(args: &Args) -> Result<Found, Failure> {
+pub(super) fn pairs(args: &Args) -> Result<Found, Failure> {
     let found = find(&args.input, args.layout)?;
     if found.single && !args.swap && found.pairs.iter().any(|pair| pair.files.are_named_in_reverse()) {
         return Err("left and right are swapped: the first file is named right and the second left; give them in the \
@@ -231,24 +242,24 @@ fn all<'a>(args: &Args, how: (&Options, &Scene), found: &'a Found) -> Result<Vec
     }
     let job = |workspace: &mut Workspace, index: usize| {
         let pair = &pairs[index];
-        let done = one(args, how, (found, pair), workspace, None);
+        let done = one(args, how, (found.single, pair), workspace, None);
         bar.inc(1);
         done
     };
-    let done = batch::run(pairs.len(), args.jobs.map(usize::from), &job)?;
+    let done = crew::run(pairs.len(), args.jobs.map(usize::from), &job)?;
     bar.finish_and_clear();
     Ok(done)
 }
 
-/// One pair, shown if there is a page for it.
-fn one<'a>(
+/// One pair, the only one or among others, shown if there is a page for it.
+pub(super) fn one<'a>(
     args: &Args,
     how: (&Options, &Scene),
-    (found, pair): (&Found, &'a Pair),
+    (single, pair): (bool, &'a Pair),
     workspace: &mut Workspace,
     view: Option<&mut View>,
 ) -> Done<'a> {
-    let in_out = |out: &PathBuf| if found.single { out.clone() } else { out.join(&pair.name) };
+    let in_out = |out: &PathBuf| if single { out.clone() } else { out.join(&pair.name) };
     let folder = args.out.as_ref().map(in_out);
     let result = attempt(args, how, (pair, folder.as_deref()), workspace, view);
     let result = result.map_err(|failure| with_guess(pair, failure));
@@ -295,22 +306,37 @@ fn attempt(
     Ok(Success { model, loading, warnings, calibration })
 }
 
+/// A failure, told with more than its own words.
+#[derive(Debug, thiserror::Error)]
+#[error("{words}")]
+struct Explained {
+    words: String,
+    failure: Failure,
+}
+
+impl Explained {
+    fn by(more: &str, failure: Failure) -> Failure {
+        Self { words: format!("{}; {more}", words_of(&*failure)), failure }.into()
+    }
+}
+
+/// A failure itself, whatever was said about it.
+pub(super) fn plain(failure: &Failure) -> &Failure {
+    failure.downcast_ref::<Explained>().map_or(failure, |explained| plain(&explained.failure))
+}
+
 /// A failure, with what was suspicious about the files.
 fn with_warnings(warnings: &[String], failure: Failure) -> Failure {
-    if warnings.is_empty() {
-        return failure;
-    }
-    format!("{}; {}", words_of(&*failure), warnings.join("; ")).into()
+    if warnings.is_empty() { failure } else { Explained::by(&warnings.join("; "), failure) }
 }
 
 /// A failure, with a hint if the user may have forgotten the other image.
 fn with_guess(pair: &Pair, failure: Failure) -> Failure {
     match pair.files {
-        Files::One(_, None) if !failure.is::<PictureError>() => format!(
-            "{}; one image was given and taken for both views: give two, or --layout if it was halved the wrong way",
-            words_of(&*failure)
-        )
-        .into(),
+        Files::One(_, None) if !plain(&failure).is::<PictureError>() => Explained::by(
+            "one image was given and taken for both views: give two, or --layout if it was halved the wrong way",
+            failure,
+        ),
         _ => failure,
     }
 }

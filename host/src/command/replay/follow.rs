@@ -26,7 +26,7 @@ pub(super) fn all<'a>(
     let mut make = |pair: &'a _, view: &mut View| {
         let (settings, version) = view.control().settings();
         view::obey(&settings, &mut options, &mut scene);
-        (one(args, (&options, &scene), (found, pair), &mut workspace, Some(view)), version)
+        (one(args, (&options, &scene), (found.single, pair), &mut workspace, Some(view)), version)
     };
     let (mut done, mut obeyed) = (Vec::new(), 0);
     for pair in &found.pairs {
