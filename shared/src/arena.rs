@@ -125,12 +125,14 @@ impl<T> Deref for List<'_, T> {
     type Target = [T];
 
     fn deref(&self) -> &[T] {
+        debug_assert!(self.len <= self.entries.len());
         self.entries.get(..self.len).unwrap_or_default()
     }
 }
 
 impl<T> DerefMut for List<'_, T> {
     fn deref_mut(&mut self) -> &mut [T] {
+        debug_assert!(self.len <= self.entries.len());
         self.entries.get_mut(..self.len).unwrap_or_default()
     }
 }

@@ -173,7 +173,7 @@ impl<'a> Bitmap<'a> {
     }
 
     /// Words from a row to the next: what an index is divided by.
-    fn pitch(&self) -> NonZeroUsize {
+    pub(crate) fn pitch(&self) -> NonZeroUsize {
         NonZeroUsize::new(self.row_words).unwrap_or(NonZeroUsize::MIN)
     }
 
@@ -206,7 +206,7 @@ impl<'a> Bitmap<'a> {
 
     /// Set what is clear and clear what is set, inside the image.
     pub fn invert(&mut self) {
-        let n = self.row_words.max(1);
+        let n = self.pitch().get();
         let valid = self.valid(n - 1);
         for row in self.words.chunks_exact_mut(n) {
             row.iter_mut().for_each(|word| *word = !*word);
@@ -240,7 +240,7 @@ impl<'a> Bitmap<'a> {
 
     /// Each row that has a set pixel, with its first and its last one: `(v, first, last)`.
     pub fn spans(&self) -> impl Iterator<Item = (usize, usize, usize)> + '_ {
-        let rows = self.words.chunks_exact(self.row_words.max(1));
+        let rows = self.words.chunks_exact(self.pitch().get());
         (0..self.size.height).zip(rows).filter_map(|(v, row)| {
             let first = row.iter().position(|w| *w != 0)?;
             let last = row.iter().rposition(|w| *w != 0)?;

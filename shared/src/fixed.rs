@@ -74,6 +74,12 @@ const fn digit(high: u32, next: u32, d: u32) -> (u32, u32) {
     (q, (high << 16 | next).wrapping_sub(q.wrapping_mul(d)))
 }
 
+/// `v` brought to `least..=greatest`; to `least` where the bounds cross, where `clamp` panics.
+pub const fn confined(v: i32, least: i32, greatest: i32) -> i32 {
+    let v = if v > greatest { greatest } else { v };
+    if v < least { least } else { v }
+}
+
 /// `v` saturated to `i32`.
 pub const fn saturate(v: i64) -> i32 {
     if v > i32::MAX as i64 {

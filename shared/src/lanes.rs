@@ -23,10 +23,16 @@ pub trait Lanes:
     /// The same word everywhere.
     fn splat(word: Word) -> Self;
 
-    /// The words from `at` on; where there are fewer than [`Self::WORDS`] it may panic.
+    /// The words from `at` on.
+    ///
+    /// # Panics
+    /// For registers wider than a word, when there are fewer than [`Self::WORDS`].
     fn load(words: &[Word], at: usize) -> Self;
 
-    /// Write the words from `at` on; where there are fewer than [`Self::WORDS`] it may panic.
+    /// Write the words from `at` on.
+    ///
+    /// # Panics
+    /// For registers wider than a word, when there are fewer than [`Self::WORDS`].
     fn store(self, words: &mut [Word], at: usize);
 
     /// Bit `k` for each word `k` that has one of these bits.

@@ -5,7 +5,6 @@
 #[cfg(target_os = "none")]
 mod board {
     use cortex_m::asm::wfi;
-    use cortex_m::peripheral::SCB;
     use defmt::{error, info};
     use embassy_time::{Duration, block_for};
     use firmware::board::h743::Board;
@@ -14,6 +13,7 @@ mod board {
     use firmware::memory::{Qvga, Storage};
     use firmware::selftest;
     use shared::stage::warp::knots;
+    use shared::wire::finding_code;
     use static_cell::ConstStaticCell;
 
     const KNOTS: usize = knots(Qvga::CAPACITIES.size);
@@ -30,21 +30,28 @@ mod board {
         }
     }
 
+    /// What is wrong with settings, memory or processor is wrong after a reset too.
+    fn stop() -> ! {
+        loop {
+            wfi();
+        }
+    }
+
     #[cortex_m_rt::entry]
     fn main() -> ! {
-        let Some(Board { mut ports, mut lamps, birth }) = Board::take() else { SCB::sys_reset() };
+        let Some(Board { mut ports, mut lamps, birth }) = Board::take() else {
+            error!("a driver refuses its settings");
+            stop()
+        };
         // By the codes of docs/wire-format.md: text of core's, made at run time, would call itself.
         info!("started: reset {=u8}, {=u32} by the watchdog", birth.reset as u8, birth.watchdog_resets);
         let storage = STORAGE.take();
         match selftest::run(storage) {
             Ok(disparity) => info!("self-test: the ring's disparity is {} / 256 px", disparity),
-            Err(_) => {
+            Err(finding) => {
                 lamps.show(Condition::Faulty);
-                error!("self-test: the ring is not found");
-                // What is wrong with the memory or the processor is wrong after a reset too.
-                loop {
-                    wfi();
-                }
+                error!("the self-test failed: finding {=u8}", finding_code(&finding));
+                stop()
             }
         }
         let mut device = Device::new(storage, DESK.take(), birth);

@@ -43,7 +43,7 @@ pub fn boundary<'w>(
 ) -> Result<Bitmap<'w>, CapacityError> {
     let size = bitmap.size();
     let mut out = Bitmap::over(size, words)?;
-    let n = size.row_words().max(1);
+    let n = bitmap.pitch().get();
     let all = bitmap.words();
     let border = n.min(all.len());
     // Every set pixel of the first and the last row is boundary.
@@ -80,6 +80,7 @@ pub fn boundary<'w>(
 /// The boundary of the words `here`, as of one long row, between those of the rows above and below.
 fn within(element: Element, [above, here, below]: [&[Word]; 3], out: &mut [Word]) {
     // What the pixels to the west and to the east must have too, with a clear word at either end.
+    debug_assert!(here.len() <= TOGETHER);
     let mut columns = [0; TOGETHER + 2];
     let columns = columns.get_mut(..here.len() + 2).unwrap_or_default();
     let inner = columns.get_mut(1..).unwrap_or_default();

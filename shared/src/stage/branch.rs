@@ -170,6 +170,7 @@ fn averages(pixels: &[Pixel], balls: &Balls<'_>) -> [Average; TOGETHER] {
     let far = pixels.iter().map(|p| centre.distance_squared(p.centre())).max().unwrap_or(0);
     let radius = REACH + isqrt(far.cast_unsigned()) as i32 + 1;
     balls.strips.walk(Disc { centre, radius }, |k, ball, _| {
+        debug_assert!(k < balls.depths.len());
         let Some(depth) = balls.depths.get(k) else { return };
         for (average, pixel) in averages.iter_mut().zip(pixels) {
             let near = reach_squared - pixel.centre().distance_squared(ball.centre);

@@ -225,16 +225,14 @@ fn resample(
     let (step, parts) = (length / len, length % len);
     let (mut i, mut beyond, mut carried) = (0, 0, 0);
     for _ in 0..len {
-        let (from, next) = loop {
-            let Some(&from) = crossings.get(i) else { return Ok(()) };
-            match crossings.get(i + 1) {
-                Some(_) if i64::from(from.to_next) <= beyond => {
-                    beyond -= i64::from(from.to_next);
-                    i += 1;
-                }
-                next => break (from, next.map_or(first, |c| c.at)),
-            }
-        };
+        while let Some([from, _]) = crossings.get(i..i + 2)
+            && i64::from(from.to_next) <= beyond
+        {
+            beyond -= i64::from(from.to_next);
+            i += 1;
+        }
+        let Some(from) = crossings.get(i) else { return Ok(()) };
+        let next = crossings.get(i + 1).map_or(first, |c| c.at);
         let at = from.at.lerp(next, beyond as i32, from.to_next.into());
         let point = ContourPoint { at, normal: Direction::default(), border: from.border != 0 };
         push(points, point, "contour points")?;

@@ -56,6 +56,7 @@ pub fn ball_depths(
     optics: Optics,
     depths: &mut VecView<BallDepth>,
 ) -> Result<(), CapacityError> {
+    debug_assert_eq!(points.len(), matches.len());
     depths.clear();
     for ball in balls {
         let depth = match ball.contacts.map(|k| points.get(k as usize).zip(matches.get(k as usize))) {

@@ -90,8 +90,12 @@ pub fn squared_distances(
     for v in 0..bitmap.size().height {
         row.fill(0);
         for run in Runs::of(bitmap.row(v as i32)) {
-            let squares = &mut row[run.clone()];
-            along_run(&mut plane.row_mut(v)[run], envelope, |k, _, square| squares[k] = square);
+            let squares = row.get_mut(run.clone()).unwrap_or_default();
+            along_run(plane.row_mut(v).get_mut(run).unwrap_or_default(), envelope, |k, _, square| {
+                if let Some(place) = squares.get_mut(k) {
+                    *place = square;
+                }
+            });
         }
         sink(v, row);
     }
@@ -108,8 +112,8 @@ fn check<'s>(bitmap: &Bitmap<'_>, scratch: &'s mut [Parabola]) -> Result<&'s mut
 fn rows(bitmap: &Bitmap<'_>) -> Range<usize> {
     let first = bitmap.words().iter().position(|word| *word != 0);
     let last = bitmap.words().iter().rposition(|word| *word != 0);
-    let row = |word: usize| word.checked_div(bitmap.size().row_words()).unwrap_or(0);
-    first.zip(last).map_or(0..0, |(first, last)| row(first)..row(last) + 1)
+    let n = bitmap.pitch();
+    first.zip(last).map_or(0..0, |(first, last)| first / n..last / n + 1)
 }
 
 /// The runs of set pixels of a row, from left to right.

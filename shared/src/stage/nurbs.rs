@@ -27,7 +27,7 @@
 
 use crate::arena::Arena;
 use crate::envelope::{ENTRY_BITS, Envelope};
-use crate::fixed::{ONE, PX, div_floor, div_round, saturate};
+use crate::fixed::{ONE, PX, confined, div_floor, div_round, saturate};
 use crate::limits::{CapacityError, push};
 use crate::stage::branch::{Ball, Sample};
 use core::num::NonZeroUsize;
@@ -125,8 +125,9 @@ impl<'a> Nurbs<'a> {
 
     /// The ball at parameter `t`, 1/65536 span; at the nearest end if it is outside an open curve.
     pub fn evaluate(&self, t: i32) -> Ball {
+        debug_assert!(self.controls.len() > DEGREE);
         let end = self.end();
-        let t = if self.closed { t.checked_rem_euclid(end).unwrap_or(0) } else { t.min(end).max(0) };
+        let t = if self.closed { t.checked_rem_euclid(end).unwrap_or(0) } else { confined(t, 0, end) };
         let (first, basis) = basis(span_count(self.controls.len(), self.closed), self.closed, t);
         let mut share = 0;
         let mut sums = [0; 4];
@@ -322,10 +323,10 @@ const fn span_count(controls: usize, closed: bool) -> usize {
 /// The four basis functions that are not 0 at `t` (1/65536 span), in 1/2^30, and the index of the first
 /// (Cox and de Boor; The NURBS Book, A2.2). They add up to exactly 1.
 fn basis(spans: usize, closed: bool, t: i32) -> (usize, [i32; 4]) {
-    let span = (t >> 16).min(spans as i32 - 1).max(0);
+    let span = confined(t >> 16, 0, spans as i32 - 1);
     let knot = |offset: i32| {
         let knot = span + offset;
-        if closed { knot } else { knot.min(spans as i32).max(0) }
+        if closed { knot } else { confined(knot, 0, spans as i32) }
     };
     let mut values = [1 << BASIS_BITS, 0, 0, 0];
     for degree in 1..=DEGREE {

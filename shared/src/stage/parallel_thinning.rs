@@ -76,9 +76,11 @@ pub fn thin_in_lanes<L: Lanes>(
     rule: Parallel,
     mut scratch: Arena<'_>,
 ) -> Result<Report, CapacityError> {
-    let scratch = scratch.take(scratch_words(bitmap.size()), "words of scratch")?;
+    let what = "words of scratch";
+    let scratch = scratch.take(scratch_words(bitmap.size()), what)?;
+    let limit = scratch.len();
     let Some(cut) = Cut::of(bitmap) else { return Ok(Report::default()) };
-    let Some([mut now, mut next, due, found]) = cut.parts(scratch) else { return Ok(Report::default()) };
+    let [mut now, mut next, due, found] = cut.parts(scratch).ok_or(CapacityError { what, limit })?;
     let before = bitmap.count();
     cut.read(bitmap, now);
     next.iter_mut().zip(&*now).for_each(|(to, from)| *to = *from);

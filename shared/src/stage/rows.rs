@@ -387,24 +387,21 @@ fn reject_outliers(trusted: &mut List<'_, Trusted>) {
 /// Take a value out of a sorted window that holds it, and put another in.
 fn replace(window: &mut [i32; 2 * MEDIAN_REACH + 1], old: i32, new: i32) {
     let mut place = window.iter().position(|w| *w == old).unwrap_or(0);
-    let put = |window: &mut [i32], place: usize, value: i32| {
-        if let Some(entry) = window.get_mut(place) {
-            *entry = value;
-        }
-    };
-    while let Some(&next) = window.get(place + 1)
-        && next < new
+    if let Some(entry) = window.get_mut(place) {
+        *entry = new;
+    }
+    while let Some([here, next]) = window.get_mut(place..place + 2)
+        && next < here
     {
-        put(window, place, next);
+        swap(here, next);
         place += 1;
     }
-    while let Some(&before) = window.get(place.wrapping_sub(1))
-        && before > new
+    while let Some([before, here]) = window.get_mut(place.wrapping_sub(1)..place + 1)
+        && here < before
     {
-        put(window, place, before);
+        swap(before, here);
         place -= 1;
     }
-    put(window, place, new);
 }
 
 /// The average of match `k` and its neighbours within a few pixels of arc: (excess, turn).

@@ -113,6 +113,7 @@ fn sort_by_distance<'o>(
     let largest = object_runs(bitmap).map(values).map(greatest).max().unwrap_or(0);
     let set = bitmap.count();
     let order = scratch.take::<u32>(scratch_order(set, largest), "entries of the thinning order")?;
+    debug_assert!(set <= order.len());
     let (list, next) = order.split_at_mut_checked(set).unwrap_or_default();
     next.fill(0);
     for (v, run) in object_runs(bitmap) {

@@ -20,7 +20,7 @@
 
 use crate::bitmap::{Grey, Size};
 use crate::camera::Mapping;
-use crate::fixed::{PX, PX_BITS};
+use crate::fixed::{PX, PX_BITS, confined};
 use crate::limits::{CapacityError, MAX_SIDE};
 
 /// Rectified pixels from knot to knot, a power of two.
@@ -168,7 +168,7 @@ const fn stretches([a, b, c, d]: [Place; 4]) -> [Stretch; 2] {
 /// The grey value at a place, linearly between pixels; 0 if the picture has none.
 fn grey_at(raw: Grey<'_>, [x, y]: Place) -> u8 {
     let Size { width, height } = raw.size();
-    let inside = |x: i32, side: usize| x.min((side.max(1) as i32 - 1) * PX).max(0);
+    let inside = |x: i32, side: usize| confined(x, 0, (side as i32 - 1) * PX);
     let (x, y) = (inside(x, width), inside(y, height));
     let (u, v) = ((x >> PX_BITS) as usize, (y >> PX_BITS) as usize);
     let (right, below) = ((x & (PX - 1)) as u32, (y & (PX - 1)) as u32);

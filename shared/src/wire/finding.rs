@@ -67,12 +67,26 @@ pub(super) const fn side(code: u32) -> Result<Side, WireError> {
     }
 }
 
+/// A finding's code, as in the table of docs/wire-format.md.
+pub fn finding_code(finding: &Finding) -> u8 {
+    coded(finding).0
+}
+
 /// Append a finding: 17 bytes.
 pub(super) fn write_finding(finding: &Finding, writer: &mut Writer<'_>) {
+    let (code, numbers) = coded(finding);
+    writer.u8(code);
+    for x in numbers {
+        writer.u32(x);
+    }
+}
+
+/// A finding as its code and its numbers.
+fn coded(finding: &Finding) -> (u8, [u32; 4]) {
     let signed = |x: i32| x as u32;
     // No size of a picture or a list that fits its memory is cut here: all are below 2^32.
     let size = |x: usize| x as u32;
-    let (code, numbers): (u8, [u32; 4]) = match *finding {
+    match *finding {
         Finding::SizesDiffer { left, right } => {
             (1, [size(left.0), size(left.1), size(right.0), size(right.1)])
         }
@@ -95,10 +109,6 @@ pub(super) fn write_finding(finding: &Finding, writer: &mut Writer<'_>) {
             let list = LISTS.iter().position(|name| *name == what).unwrap_or(0);
             (17, [size(list), size(limit), 0, 0])
         }
-    };
-    writer.u8(code);
-    for x in numbers {
-        writer.u32(x);
     }
 }
 

@@ -32,6 +32,7 @@ mod walk;
 pub use calibration::calibration_crc;
 pub use command::{ExposureSetting, ToDevice};
 pub use error::WireError;
+pub use finding::finding_code;
 pub use frame::{Counters, Decoder, Frame, Sequence};
 pub use hello::{Capacities, Hello, MAX_BOARD, ResetReason};
 pub use message::{Answer, ErrorCode, Exposure, Health, PairReport, ToHost};

@@ -1,6 +1,7 @@
 //! Images of the firmware, read as files: functions and their code, the vector table, the places of panics.
 
 use object::{Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
+use rustc_demangle::demangle;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
@@ -55,7 +56,9 @@ impl Image {
                 }
                 // Of names for one function the first will do.
                 (_, SymbolKind::Text) => {
-                    starts.entry(address & !1).or_insert((path_of(name), symbol.size() as u32));
+                    starts
+                        .entry(address & !1)
+                        .or_insert((format!("{:#}", demangle(name)), symbol.size() as u32));
                 }
                 _ => {}
             }
@@ -192,52 +195,4 @@ pub fn patched(path: &Path, address: u32, bytes: &[u8]) -> NamedTempFile {
     let file = NamedTempFile::new().unwrap();
     std::fs::write(file.path(), copy).unwrap();
     file
-}
-
-/// What signs are written as in names.
-const SIGNS: [(&str, &str); 14] = [
-    ("$LT$", "<"),
-    ("$GT$", ">"),
-    ("$RF$", "&"),
-    ("$BP$", "*"),
-    ("$C$", ","),
-    ("$LP$", "("),
-    ("$RP$", ")"),
-    ("$u20$", " "),
-    ("$u7b$", "{"),
-    ("$u7d$", "}"),
-    ("$u5b$", "["),
-    ("$u5d$", "]"),
-    ("_<", "<"),
-    ("..", "::"),
-];
-
-/// The path in a name: segments with their lengths before them, and a hash behind. Newer names, of which only those of
-/// the language's own library are here, have more between segments, which is left out: of what types, among others.
-fn path_of(name: &str) -> String {
-    let is_new = name.starts_with("_R");
-    let Some(rest) = name.strip_prefix("_ZN").or(name.strip_prefix("_R")) else { return name.to_owned() };
-    let rest = if is_new { without_crates(rest) } else { rest.to_owned() };
-
-    let (mut rest, mut segments) = (&*rest, Vec::new());
-    while let Some(at) = rest.find(|c: char| c.is_ascii_digit()) {
-        let digits = rest[at..].chars().take_while(char::is_ascii_digit).count();
-        let mut behind = &rest[at + digits..];
-        if is_new {
-            behind = behind.strip_prefix('_').unwrap_or(behind);
-        }
-        let length = rest[at..at + digits].parse().unwrap_or(usize::MAX);
-        // A digit within something else is none.
-        let segment = behind.get(..length).filter(|segment| segment.len() > 1 || !is_new);
-        rest = &behind[segment.map_or(0, str::len)..];
-        segments.extend(segment.filter(|segment| segment.len() != 17 || !segment.starts_with('h')));
-    }
-    SIGNS.iter().fold(segments.join("::"), |path, (code, sign)| path.replace(code, sign))
-}
-
-/// A newer name without what tells crates of one name apart.
-fn without_crates(name: &str) -> String {
-    let mut parts = name.split("Cs");
-    let first = parts.next().unwrap_or_default().to_owned();
-    parts.fold(first, |name, part| name + part.split_once('_').unwrap_or_default().1)
 }

@@ -11,6 +11,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// What an exception pushes: 26 words with those of floating point, and 4 bytes to align.
 const EXCEPTION: u32 = 26 * 4 + 4;
+/// The instruction that does nothing.
+const NOP: [u8; 2] = 0xBF00u16.to_le_bytes();
 /// Deeper is no function: the analysis runs in circles.
 const LIMIT: i32 = 1 << 24;
 
@@ -52,12 +54,16 @@ struct Frame {
 }
 
 fn frame(image: &Image, function: &Function) -> Result<Frame, String> {
+    let is_code = |at: u32| (function.start..function.end).contains(&at) && image.is_code(at);
     let mut frame = Frame::default();
     let mut depths = BTreeMap::<u32, i32>::new();
     // Address, depth, and how many instructions still depend on a condition.
     let mut paths = vec![(function.start, 0, 0)];
     while let Some((at, depth, mut depends)) = paths.pop() {
-        if at >= function.end || !image.is_code(at) || depths.get(&at).is_some_and(|known| *known >= depth) {
+        if !is_code(at) {
+            return Err(format!("{} goes on at {at:#x}, where it has no code", function.name));
+        }
+        if depths.get(&at).is_some_and(|known| *known >= depth) {
             continue;
         }
         if depth > LIMIT {
@@ -72,6 +78,16 @@ fn frame(image: &Image, function: &Function) -> Result<Frame, String> {
         depends = u32::saturating_sub(depends, 1);
         let mut go = |to: u32, depth: i32, depends: u32| paths.push((to, depth, depends));
         match effect {
+            // What does not come back has nothing behind its call, but for what fills the function up.
+            Effect::Call(_) | Effect::CallRegister => {
+                let to = if let Effect::Call(to) = effect { Some(to) } else { None };
+                frame.calls.insert((here, to));
+                let fills = |at: &u32| image.at(*at).is_some_and(|code| code.starts_with(&NOP));
+                let behind = (next..).step_by(NOP.len()).find(|at| !fills(at)).unwrap_or(next);
+                if is_code(behind) {
+                    go(behind, depth, depends);
+                }
+            }
             Effect::None => go(next, depth, depends),
             Effect::If(count) => go(next, depth, count),
             Effect::Stack(bytes) => {
@@ -79,14 +95,6 @@ fn frame(image: &Image, function: &Function) -> Result<Frame, String> {
                 if goes_on {
                     go(next, depth, depends);
                 }
-            }
-            Effect::Call(to) => {
-                frame.calls.insert((here, Some(to)));
-                go(next, depth, depends);
-            }
-            Effect::CallRegister => {
-                frame.calls.insert((here, None));
-                go(next, depth, depends);
             }
             Effect::Jump(to, is_conditional) => {
                 if (function.start..function.end).contains(&to) && to != function.start {
@@ -110,7 +118,10 @@ fn frame(image: &Image, function: &Function) -> Result<Frame, String> {
                 let entries = table[..(end - next) as usize].chunks_exact(bytes);
                 for entry in entries {
                     let distance = entry.iter().rev().fold(0, |sum, byte| sum << 8 | u32::from(*byte));
-                    go(next + 2 * distance, depth, 0);
+                    // What fills a table up to whole instructions leads anywhere.
+                    if is_code(next + 2 * distance) {
+                        go(next + 2 * distance, depth, 0);
+                    }
                 }
             }
             Effect::End => {
@@ -178,7 +189,13 @@ impl<'i> Walk<'i> {
                 let names = self.known.callees.get(&caller.name);
                 let names = names.ok_or(format!("what does {} call by a register?", caller.name))?;
                 self.used.insert(caller.name.clone());
-                image.functions().filter(|function| names.contains(&function.name)).collect()
+                let found: Vec<_> =
+                    image.functions().filter(|function| names.contains(&function.name)).collect();
+                if found.is_empty() {
+                    return Err(format!("{} has nothing that {} may call", image.name, caller.name));
+                }
+                self.used.extend(found.iter().map(|function| function.name.clone()));
+                found
             }
         };
         let (ends, goes_on): (Vec<_>, _) = all.into_iter().partition(|f| self.known.ends.contains(&f.name));

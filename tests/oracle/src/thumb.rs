@@ -83,9 +83,9 @@ fn long(address: u32, first: u32, second: u32) -> Effect {
         return match second >> 12 & 0b101 {
             0b101 => Effect::Call(ahead(signed(far, 25))),
             0b001 => Effect::Jump(ahead(signed(far, 25)), false),
-            // Barriers and special registers have a place of their own among conditions; UDF.W is one, too.
+            // Barriers and special registers have a place of their own among conditions; UDF.W is there, too.
             0b000 if first >> 7 & 7 != 7 => Effect::Jump(ahead(signed(near, 21)), true),
-            0b010 if first >> 4 == 0xF7F => Effect::End,
+            0b000 if first >> 4 == 0xF7F && second >> 12 == 0b1010 => Effect::End,
             _ => Effect::None,
         };
     }
@@ -107,7 +107,9 @@ fn long(address: u32, first: u32, second: u32) -> Effect {
         0xF10D | 0xF50D if to == SP => Effect::Stack(-constant(first, second).cast_signed()),
         0xF2AD | 0xF6AD if to == SP => Effect::Stack(plain(first, second).cast_signed()),
         0xF20D | 0xF60D if to == SP => Effect::Stack(-plain(first, second).cast_signed()),
-        0xE8D0..=0xE8DF if second & 0xFFE0 == 0xF000 => Effect::Table(1 + (second >> 4 & 1) as usize),
+        0xE8DF if second & 0xFFE0 == 0xF000 => Effect::Table(1 + (second >> 4 & 1) as usize),
+        // A table that lies elsewhere.
+        0xE8D0..=0xE8DE if second & 0xFFE0 == 0xF000 => Effect::JumpRegister,
         // Whatever else computes the stack pointer, or loads what runs next.
         _ if first >> 9 == 0b1110101 && to == SP && second >> 15 == 0 => Effect::Unknown,
         _ if first >> 11 == 0b11110 && second >> 15 == 0 && to == SP && first >> 4 & 1 == 0 => {
@@ -143,7 +145,7 @@ mod tests {
     /// As an assembler writes them.
     #[test]
     fn instructions_that_matter_are_told_from_others() {
-        let cases: [(&[u16], Effect); 24] = [
+        let cases: [(&[u16], Effect); 26] = [
             (&[0xB5F0], Effect::Stack(20)),                   // push {r4-r7, lr}
             (&[0xBDF0], Effect::End),                         // pop {r4-r7, pc}
             (&[0xB083], Effect::Stack(12)),                   // sub sp, #12
@@ -164,10 +166,12 @@ mod tests {
             (&[0xE7FE], Effect::Jump(0x1000, false)),         // b 0x1000
             (&[0xB110], Effect::Jump(0x1008, true)),          // cbz r0, 0x1008
             (&[0xE8DF, 0xF001], Effect::Table(1)),            // tbb [pc, r1]
+            (&[0xE8D2, 0xF001], Effect::JumpRegister),        // tbb [r2, r1]
             (&[0xBF18], Effect::If(1)),                       // it ne
             (&[0x466F], Effect::None),                        // mov r7, sp
             (&[0x46BD], Effect::Unknown),                     // mov sp, r7
             (&[0xDE00], Effect::End),                         // udf #0
+            (&[0xF7F0, 0xA000], Effect::End),                 // udf.w #0
         ];
         for (halves, effect) in cases {
             let bytes: Vec<u8> = halves.iter().flat_map(|half| half.to_le_bytes()).collect();

@@ -30,9 +30,12 @@ pub struct Eyes<'c> {
 impl<'c> Eyes<'c> {
     /// Eyes that see the first pair of the file first. The image ends when that does not hold whole pairs.
     pub fn new(file: File, clock: &'c Clock) -> Self {
-        let length = file.metadata().map_or(0, |file| file.len());
+        let Ok(length) = file.metadata().map(|file| file.len()) else {
+            refuse("the file's length cannot be read")
+        };
         if length == 0 || !length.is_multiple_of(2 * PICTURE) {
-            refuse(format_args!("{length} bytes are no pairs of pictures"));
+            let (width, height) = SIZE;
+            refuse(format_args!("{length} bytes: not a whole number of pairs of {width}x{height} luma"));
         }
         let pairs = length / (2 * PICTURE);
         Self { file, clock, pairs, next: 0, started: false, taken: [None; 2] }

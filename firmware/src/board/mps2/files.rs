@@ -20,8 +20,12 @@ pub fn refuse(why: impl Display) -> ! {
 
 /// The file that the image's first argument names, open to be read. The image ends when there is none.
 pub fn argument() -> File {
-    let Ok(arguments) = args::<LONGEST>() else { refuse("there are no arguments") };
-    let Some(Ok(path)) = (&arguments).into_iter().nth(1) else { refuse("the argument, a file, is missing") };
+    let Ok(arguments) = args::<LONGEST>() else {
+        refuse(format_args!("the arguments cannot be read: at most {LONGEST} bytes"))
+    };
+    let Some(Ok(path)) = (&arguments).into_iter().nth(1) else {
+        refuse("the first argument must be a file's path, in UTF-8")
+    };
     let mut name = [0; LONGEST];
     name.iter_mut().zip(path.bytes()).for_each(|(place, byte)| *place = byte);
     let file = CStr::from_bytes_until_nul(&name).ok().and_then(|name| File::open(name).ok());

@@ -13,7 +13,8 @@ impl Register {
     }
 
     pub(super) fn read(self) -> u32 {
-        // SAFETY: every address is that of a register, always there, aligned, without effect on what Rust knows of.
+        // SAFETY: every address is that of a register or of memory that is nobody's: always there, aligned, without
+        // effect on what Rust knows of.
         unsafe { self.0.read_volatile() }
     }
 

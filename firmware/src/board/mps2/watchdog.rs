@@ -11,7 +11,8 @@ const LOAD: Register = Register::at(0x4000_8000);
 const CONTROL: Register = Register::at(0x4000_8008);
 const CLEAR: Register = Register::at(0x4000_800C);
 
-/// Two words at the end of memory, which the map leaves out (`megabytes.x`): [`BITTEN`] or anything else, and how often so far.
+/// Two words at the end of memory, which the map leaves out (`megabytes.x`): [`BITTEN`] or anything else, and how
+/// often so far.
 const CAUSE: Register = Register::at(0x203F_FFF0);
 const BITES: Register = Register::at(0x203F_FFF4);
 /// The watchdog's mark, which memory is not found with when it is switched on.
@@ -38,10 +39,8 @@ impl Watchdog {
 
 /// Write down that the watchdog is about to reset the board.
 pub(super) fn bite() {
-    if CAUSE.read() != BITTEN {
-        CAUSE.write(BITTEN);
-        BITES.write(BITES.read().saturating_add(1));
-    }
+    CAUSE.write(BITTEN);
+    BITES.write(BITES.read().saturating_add(1));
 }
 
 /// What is remembered of the time before the start; the reason is forgotten with this.

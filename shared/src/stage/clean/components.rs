@@ -69,7 +69,7 @@ pub(super) fn each_component(
     [mut above, mut here]: [&mut [Run]; 2],
     mut complete: impl FnMut(&mut Bitmap<'_>, Component),
 ) {
-    let n = bitmap.size().row_words().max(1);
+    let n = bitmap.pitch();
     let first = bitmap.words().iter().position(|word| *word != 0);
     let last = bitmap.words().iter().rposition(|word| *word != 0);
     let (Some(top), Some(bottom)) = (first.map(|i| i / n), last.map(|i| i / n)) else { return };
@@ -94,6 +94,7 @@ fn find_runs(bitmap: &Bitmap<'_>, (v, whole): (usize, bool), ground: Ground, run
     let width = bitmap.size().width;
     let (mut count, mut start) = (0, 0);
     let mut add = |start: usize, end: usize| {
+        debug_assert!(count < runs.len());
         let Some(run) = runs.get_mut(count) else { return };
         *run = Run {
             start: start as u16,
