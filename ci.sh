@@ -2,9 +2,9 @@
 # The one list of checks.
 #
 #   ./ci.sh            everything
-#   ./ci.sh NAME...    single parts: fmt lint test bench doc firmware v4l2 fuzz; qemu, which test contains; and
-#                      fleet, which builds the optional features, supply, which installs tools for minutes, and
-#                      miri, all three run where changes are merged
+#   ./ci.sh NAME...    single parts: fmt lint test bench doc firmware v4l2 fuzz; qemu, which test contains;
+#                      supply, which installs tools for minutes and is run where changes are merged; and fleet,
+#                      which builds the optional features, and miri, which are run by hand
 #
 # Installs what a fresh Debian machine with rustup lacks. The last line is "N passed, N failed", counting
 # tests, and one for each check that is not made of tests. A part that ran no test fails. Exit codes: 0 all

@@ -12,9 +12,9 @@
 //! Lengths are millimetres in the left camera's axes. Everything is made in a temporary folder inside the
 //! target and moved only when all of it is complete; when something fails before that, the target is left
 //! as it was. Files are moved one after the other: if the system refuses one of these moves, or the run is killed
-//! between them, those before it are new and the rest old. A page and pictures of an earlier run that this one did not make are removed, so
-//! that a folder speaks of one run, and all of them when a pair is refused (`clear`); files of other names are not
-//! touched.
+//! between them, those before it are new and the rest old. A page and pictures of an earlier run that this one did
+//! not make are removed, so that a folder speaks of one run, and all of them when a pair is refused (`clear`); files
+//! of other names are not touched.
 
 use crate::export::ExportError;
 use crate::export::ply;
@@ -45,7 +45,6 @@ const HEAD: u64 = 1024;
 /// [`ExportError`] with the file or folder that could not be written.
 pub fn write(folder: &Path, run: &Run<'_>, page: bool) -> Result<Vec<u8>, ExportError> {
     let created = create(folder)?;
-    sweep(folder);
     let result = write_into(folder, run, page);
     if result.is_err() {
         for folder in created.iter().rev() {

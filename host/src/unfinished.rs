@@ -1,10 +1,13 @@
 //! Files and folders under way. What is written has a hidden name, which nobody takes for a result, until it is whole
 //! and is moved to its own; so whoever is killed meanwhile leaves the old file or the new one.
 //!
-//! What a killed run leaves under hidden names is swept away by a later one. Whoever writes holds a lock, which the
-//! system takes back from the dead; where it knows no locks, nothing is swept.
+//! What a killed run leaves under hidden names is swept away by a later one, ten seconds after it was last written to.
+//! Whoever writes holds a lock, which the system takes back from the dead. Where it knows no locks, nothing is swept;
+//! where it keeps them to one machine (sshfs, NFS with `local_lock`, CIFS with `nobrl`), another machine may sweep what
+//! is being written, which its writer is told when it moves it.
 
-use std::fs::{self, File};
+use std::ffi::OsStr;
+use std::fs::{self, DirEntry, File};
 use std::io;
 use std::path::Path;
 use std::time::Duration;
@@ -13,6 +16,8 @@ use tempfile::{Builder, NamedTempFile, TempDir};
 
 /// How hidden names begin.
 const PREFIX: &str = ".unfinished-";
+/// How they end: nobody else's do.
+const SUFFIX: &str = ".ossature";
 /// What is younger may not be locked yet.
 const AGE: Duration = Duration::from_secs(10);
 
@@ -24,8 +29,9 @@ pub(crate) struct Folder {
 }
 
 impl Folder {
-    /// A new one in another folder.
+    /// A new one in another folder, where what killed runs left is swept.
     pub(crate) fn within(folder: &Path) -> io::Result<Self> {
+        sweep(folder);
         let folder = builder().tempdir_in(folder)?;
         let lock = File::open(&folder).ok().filter(|lock| lock.try_lock().is_ok());
         Ok(Self { folder, _lock: lock })
@@ -44,7 +50,7 @@ pub(crate) fn beside(path: &Path) -> io::Result<NamedTempFile> {
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let file = builder.tempfile_in(folder_of(path))?;
-    // Without a lock it may be swept in vain, which its move would tell.
+    // Without a lock it may be swept by mistake, which its move would tell.
     let _ = file.as_file().try_lock();
     Ok(file)
 }
@@ -56,32 +62,36 @@ pub(crate) fn folder_of(path: &Path) -> &Path {
 
 /// Removes what killed runs left in a folder, as far as it can be removed.
 pub(crate) fn sweep(folder: &Path) {
-    sweep_older(folder, AGE);
-}
-
-/// [`sweep`], of what is older than `age`: nothing, where nobody else begins to write now.
-pub(crate) fn sweep_older(folder: &Path, age: Duration) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        // Held until it is gone, so that nobody else begins to sweep it.
+        let Some(_lock) = abandoned(&entry) else { continue };
         let path = entry.path();
-        let hidden = entry.file_name().as_encoded_bytes().starts_with(PREFIX.as_bytes());
-        if !hidden || !is_abandoned(&path, age) {
-            continue;
-        }
         // What stays does no harm.
         let _ = if path.is_dir() { fs::remove_dir_all(&path) } else { fs::remove_file(&path) };
     }
 }
 
-/// Whether it is older than `least`, and nobody works on it any more.
-fn is_abandoned(path: &Path, least: Duration) -> bool {
-    let Ok(file) = File::open(path) else { return false };
-    let age = file.metadata().and_then(|about| about.modified()).map(|modified| modified.elapsed());
-    age.is_ok_and(|age| age.is_ok_and(|age| age > least)) && file.try_lock().is_ok()
+/// Whether this is a hidden name.
+pub(crate) fn is_hidden(name: &OsStr) -> bool {
+    let name = name.as_encoded_bytes();
+    name.starts_with(PREFIX.as_bytes()) && name.ends_with(SUFFIX.as_bytes())
+}
+
+/// The lock of what is hidden and old, and on which nobody works any more. Links are not followed, and pipes, which
+/// would be waited for, not opened.
+fn abandoned(entry: &DirEntry) -> Option<File> {
+    let kind = entry.file_type().ok()?;
+    if !is_hidden(&entry.file_name()) || !(kind.is_dir() || kind.is_file()) {
+        return None;
+    }
+    let file = File::open(entry.path()).ok()?;
+    let age = file.metadata().and_then(|about| about.modified()).ok()?.elapsed().ok()?;
+    (age > AGE && file.try_lock().is_ok()).then_some(file)
 }
 
 fn builder() -> Builder<'static, 'static> {
     let mut builder = Builder::new();
-    builder.prefix(PREFIX);
+    builder.prefix(PREFIX).suffix(SUFFIX);
     builder
 }
 
@@ -95,28 +105,36 @@ mod tests {
         let parent = tempfile::tempdir().unwrap();
         let within = |name: &str| parent.path().join(name);
         let (folder, file) = (Folder::within(parent.path()).unwrap(), beside(&within("model.ply")).unwrap());
-        fs::create_dir(within(".unfinished-folder")).unwrap();
-        for name in
-            [".unfinished-folder/model.ply", ".unfinished-file", ".unfinished-young", "model.ply", ".hidden"]
-        {
+        for name in [".unfinished-folder.ossature", ".unfinished-mine"] {
+            fs::create_dir(within(name)).unwrap();
+            fs::write(within(name).join("model.ply"), "").unwrap();
+        }
+        for name in [".unfinished-file.ossature", ".unfinished-young.ossature", "model.ply", ".hidden"] {
             fs::write(within(name), "").unwrap();
         }
         for entry in fs::read_dir(parent.path()).unwrap() {
             let entry = entry.unwrap();
-            if entry.file_name() != ".unfinished-young" {
+            if entry.file_name() != ".unfinished-young.ossature" {
                 let long_ago = SystemTime::now() - 2 * AGE;
                 File::open(entry.path()).unwrap().set_modified(long_ago).unwrap();
             }
         }
+        let mut kept = vec![folder.path().into(), file.path().into()];
+        kept.extend([".hidden", ".unfinished-mine", ".unfinished-young.ossature", "model.ply"].map(within));
+        #[cfg(unix)]
+        {
+            let [link, pipe] = ["link", "pipe"].map(|name| within(&format!(".unfinished-{name}.ossature")));
+            std::os::unix::fs::symlink(within(".hidden"), &link).unwrap();
+            assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+            kept.extend([link, pipe]);
+        }
+        kept.sort();
         sweep(parent.path());
         let left = fs::read_dir(parent.path()).unwrap().map(|entry| entry.unwrap().path());
         let mut left: Vec<_> = left.collect();
         left.sort();
-        let name = |name| within(name);
-        let mut kept = vec![folder.path().into(), file.path().into()];
-        kept.extend([".hidden", ".unfinished-young", "model.ply"].map(name));
-        kept.sort();
         assert_eq!(left, kept);
+        assert!(within(".unfinished-mine/model.ply").is_file());
         sweep(Path::new("/no/such/folder"));
     }
 }

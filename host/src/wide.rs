@@ -1,8 +1,8 @@
 //! The core's inner loops in the widest registers that this machine has.
 //!
-//! What a register holds is told by [`Lanes`](shared::lanes::Lanes); the loops are the core's own, compiled once more for each
-//! width. The only place of the host that is `unsafe`: registers may be used only where the machine has
-//! them, which is asked for once.
+//! What a register holds is told by [`Lanes`](shared::lanes::Lanes); the loops are the core's own, compiled once
+//! more for each width. The only place of the host that is `unsafe`: registers may be used only where the machine
+//! has them, which is asked for once.
 
 #![expect(unsafe_code, reason = "the compiler cannot know which registers the machine has")]
 
@@ -200,12 +200,12 @@ mod x86 {
         };
     }
 
-    lanes!(Avx2 __m256i, 4, "avx2,bmi1,bmi2,lzcnt,popcnt", avx2, _mm256_set1_epi64x, _mm256_loadu_si256, _mm256_storeu_si256,
-        _mm256_and_si256, _mm256_or_si256, _mm256_xor_si256, _mm256_sll_epi64, _mm256_srl_epi64,
+    lanes!(Avx2 __m256i, 4, "avx2,bmi1,bmi2,lzcnt,popcnt", avx2, _mm256_set1_epi64x, _mm256_loadu_si256,
+        _mm256_storeu_si256, _mm256_and_si256, _mm256_or_si256, _mm256_xor_si256, _mm256_sll_epi64, _mm256_srl_epi64,
         avx2_with);
-    lanes!(Avx512 __m512i, 8, "avx512f,avx512bw,avx512vl,avx512dq,bmi1,bmi2,lzcnt,popcnt", avx512, _mm512_set1_epi64, _mm512_loadu_si512,
-        _mm512_storeu_si512, _mm512_and_si512, _mm512_or_si512, _mm512_xor_si512, _mm512_sll_epi64, _mm512_srl_epi64,
-        avx512_with);
+    lanes!(Avx512 __m512i, 8, "avx512f,avx512bw,avx512vl,avx512dq,bmi1,bmi2,lzcnt,popcnt", avx512,
+        _mm512_set1_epi64, _mm512_loadu_si512, _mm512_storeu_si512, _mm512_and_si512, _mm512_or_si512,
+        _mm512_xor_si512, _mm512_sll_epi64, _mm512_srl_epi64, avx512_with);
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ fn trial(arguments: &[&str]) {
     let [said, complained] =
         [done.stdout, done.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
     assert!(done.status.success(), "{said}\n{complained}");
-    println!("{said}");
+    println!("{said}\n{complained}");
 }
 
 #[cfg(target_os = "linux")]

@@ -1,6 +1,6 @@
-//! Whoever writes is killed at any moment: anywhere in a run, soon after a file under way is seen, and as soon as the first
-//! file has its name. Each file is the old or the new one, recordings are read to the last whole pair, and the next run
-//! takes away what was left.
+//! Whoever writes is killed at any moment: anywhere in a run, soon after a file under way is seen, and as soon as the
+//! first file has its name. Each file is the old or the new one, recordings are read to the last whole pair,
+//! and the next run takes away what was left.
 
 use crate::worker::part;
 use host::calibration::StereoCamera;
@@ -87,15 +87,20 @@ impl Bench {
             Moment::Any => true,
             Moment::UnderWay => under_way(folder).iter().any(|name| !before.0.contains(name)),
             Moment::Moving => places(folder) != before.1,
+            Moment::Holding(bytes) => held(folder) >= bytes,
         };
-        while !came(moment) && begun.elapsed() < PATIENCE && child.try_wait().is_ok_and(|end| end.is_none()) {
+        let mut is_alive = || child.try_wait().is_ok_and(|end| end.is_none());
+        while !came(moment) && begun.elapsed() < PATIENCE && is_alive() {
+            // Shorter than results take to be moved.
+            thread::sleep(Duration::from_micros(20));
         }
         let most = match moment {
-            Moment::Any => time,
+            Moment::Any | Moment::Holding(_) => time,
             Moment::UnderWay => time / 10,
             Moment::Moving => Duration::ZERO,
         };
         thread::sleep(Duration::from_micros(self.random.below(1 + most.as_micros() as u64)));
+        assert!(arguments[0] == "host" || is_alive(), "{arguments:?} never ends");
         child.kill().expect("it is killed, or has ended");
         child.wait().expect("it ends");
     }
@@ -110,6 +115,8 @@ enum Moment {
     UnderWay,
     /// As soon as a file has its name.
     Moving,
+    /// Anywhere after a recording holds so many bytes.
+    Holding(u64),
 }
 
 /// What is under way in a folder.
@@ -124,6 +131,17 @@ fn places(folder: &Path) -> Vec<u64> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let files = entries.filter(|entry| !entry.file_name().to_string_lossy().starts_with(UNDER_WAY));
     files.filter_map(|entry| Some(entry.metadata().ok()?.ino())).collect()
+}
+
+/// Bytes of a recording: a file, or the files of a folder but those under way.
+fn held(recording: &Path) -> u64 {
+    let length = |path: &Path| fs::metadata(path).map_or(0, |about| about.len());
+    if !recording.is_dir() {
+        return length(recording);
+    }
+    let entries = fs::read_dir(recording).into_iter().flatten().flatten();
+    let files = entries.filter(|entry| !entry.file_name().to_string_lossy().starts_with(UNDER_WAY));
+    files.map(|entry| length(&entry.path())).sum()
 }
 
 /// All files below a folder but those under way.
@@ -237,11 +255,14 @@ fn recorded_pairs(bench: &mut Bench, count: u64) {
     let expected =
         ["left.png", "right.png"].map(|name| fs::read(bench.path("new").join(name)).expect("a picture"));
     let expected = expected.map(|bytes| image::load_from_memory(&bytes).expect("a picture").into_luma8());
+    // More than a calibration and one picture take.
+    let a_pair = 2 * u64::from(SIZE[0] * SIZE[1]);
     let (mut whole, mut alone) = (0, 0);
-    for _ in 0..count {
+    for kill in 0..count {
         let _ = fs::remove_dir_all(&target);
         let folder = target.display().to_string();
-        bench.killed(&["record", &pair, &folder], Duration::from_millis(60), Moment::Any, &target);
+        let moment = [Moment::Any, Moment::Holding(a_pair)][kill as usize % 2];
+        bench.killed(&["record", &pair, &folder], Duration::from_millis(60), moment, &target);
         let Ok(found) = find(&[folder], None) else { continue };
         for (place, pair) in found.pairs.iter().enumerate() {
             assert_eq!(pair.name, format!("{:06}", place + 1), "none is left out");
@@ -254,7 +275,7 @@ fn recorded_pairs(bench: &mut Bench, count: u64) {
         alone += found.alone.len();
     }
     println!("record: {count} killed, {whole} whole pairs, {alone} pictures without partner");
-    assert!(whole > 0 || count < 10);
+    assert!(whole as u64 >= count / 2, "whole pairs are not found again");
 }
 
 /// A recording of `host listen`: all that was written but for the last entry, and each of its frames is read.
@@ -267,12 +288,15 @@ fn recorded_bytes(bench: &mut Bench, count: u64) {
     let bytes = bench.path("bytes");
     fs::write(&bytes, &frame).expect("bytes");
     let target = bench.path("tape");
+    // More than a calibration and one frame take, whatever becomes of the last entry.
+    let a_frame = 1000 + 2 * frame.len() as u64;
     let (mut read, mut empty) = (0, 0);
-    for _ in 0..count {
+    for kill in 0..count {
         let _ = fs::remove_file(&target);
         let arguments = [&calib, &bytes, &target].map(|path| path.display().to_string());
         let [calib, bytes, tape] = arguments.each_ref().map(String::as_str);
-        bench.killed(&["tape", calib, bytes, tape], Duration::from_millis(30), Moment::Any, &target);
+        let moment = [Moment::Any, Moment::Holding(a_frame)][kill as usize % 2];
+        bench.killed(&["tape", calib, bytes, tape], Duration::from_millis(30), moment, &target);
         let Ok(recording) = Recording::read(&target) else {
             // Killed before there was a calibration.
             let length = fs::metadata(&target).map_or(0, |about| about.len());
@@ -290,7 +314,7 @@ fn recorded_bytes(bench: &mut Bench, count: u64) {
         read += count;
     }
     println!("tape: {count} killed, {read} frames, {empty} without any");
-    assert!(read > 0 || count < 10);
+    assert!(read as u64 >= count / 2, "whole frames are not read again");
 }
 
 /// Kills each of those who write so often.

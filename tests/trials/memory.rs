@@ -36,7 +36,8 @@ impl Memory {
         let [third, last] = [mean(&taken[count / 2..count * 3 / 4]), mean(&taken[count * 3 / 4..])];
         let growth = last / third - 1.0;
         println!(
-            "memory: {:.0} kB in the first quarter, {third:.0} in the third, {last:.0} in the last ({:+.2} %), peak {peak}",
+            "memory: {:.0} kB in the first quarter, {third:.0} in the third, {last:.0} in the last ({:+.2} %), \
+             peak {peak}",
             mean(&taken[..count / 4]),
             100.0 * growth
         );

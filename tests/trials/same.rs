@@ -21,11 +21,11 @@ pub(crate) fn run(count: u64, sums: Option<&Path>) {
         let image = board::build("stages", "mps2");
         let boards = board::MACHINES.map(|machine| {
             let image = image.clone();
-            scope.spawn(move || image.is_some_and(|image| on_a_board(machine, &image, count)))
+            scope.spawn(move || image.map(|image| on_a_board(machine, &image, count)))
         });
         let found = on_this_machine(count);
-        for (board, machine) in boards.into_iter().zip(board::MACHINES) {
-            assert!(board.join().expect("it agrees"), "{machine} is not there");
+        for board in boards {
+            board.join().expect("it agrees, or was said to be missing");
         }
         found
     });
@@ -56,12 +56,12 @@ fn on_this_machine(count: u64) -> String {
     found
 }
 
-/// Whether a board is there, which then makes the same of each pair.
-fn on_a_board(machine: &str, image: &Path, count: u64) -> bool {
+/// A board makes the same of each pair, if it is there.
+fn on_a_board(machine: &str, image: &Path, count: u64) {
     let (mut bench, mut stages) = (Bench::default(), 0);
     for first in (0..count).step_by(BATCH as usize) {
         let cases: Vec<Case> = (first..count.min(first + BATCH)).map(case).collect();
-        let Some(found) = emulated::run(machine, image, &cases) else { return false };
+        let Some(found) = emulated::run(machine, image, &cases) else { return };
         for (case, found) in cases.iter().zip(found) {
             let found: Vec<String> = found.into_iter().map(|(line, _)| line).collect();
             let (expected, short) = bench.as_a_board(case);
@@ -72,5 +72,4 @@ fn on_a_board(machine: &str, image: &Path, count: u64) -> bool {
         }
     }
     println!("{machine}: {count} pairs, {stages} products of stages");
-    true
 }

@@ -10,6 +10,7 @@ use nalgebra::Vector3;
 
 use super::yaml::Field;
 use super::{CalibrationError, Camera, Distortion, StereoCamera, rotation_near};
+use crate::unfinished;
 
 /// Synonyms of the camera matrices and distortions, left and right.
 const MATRICES: [[&str; 3]; 2] = [["M1", "K1", "cameraMatrix1"], ["M2", "K2", "cameraMatrix2"]];
@@ -48,13 +49,7 @@ pub(super) fn read(first: Field<'_>, second: Option<Field<'_>>) -> Result<Stereo
 /// Writes the pair; see [`StereoCamera::write_opencv_yaml`].
 pub(super) fn write(pair: &StereoCamera, path: &Path) -> Result<(), CalibrationError> {
     let text = format(pair)?;
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    // Temporary files are private by default; this one becomes an ordinary file, as the umask says.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder
-        .tempfile_in(folder)
+    unfinished::beside(path)
         .and_then(|mut file| {
             file.write_all(text.as_bytes())?;
             file.persist(path)?;

@@ -210,6 +210,9 @@ fn open(args: &Args, layout: Option<Layout>) -> Result<Rig<Kernel>, Failure> {
         let mut kernel = Kernel::open(path)?;
         let choice = choose(kernel.camera(), &request)?;
         kernel.set(&choice)?;
+        if args.wait.is_some() {
+            kernel.tell_apart();
+        }
         note(&told_choice(path, &choice, &kernel));
         Ok::<_, CameraError>((kernel, choice))
     };

@@ -280,7 +280,7 @@ fn attempt(
     }
     let Views { images, warnings } = views;
     let make = || {
-        let (calibration, file) = args.cameras.of(pair, &images[0])?;
+        let (calibration, file) = args.cameras.of(pair, &images[0]).map_err(|error| place.cleared(error))?;
         let pictures = view.is_some().then(|| images.clone());
         let applied = scene.apply(images, &calibration);
         let (images, calibration) = applied.map_err(|error| place.cleared(error))?;

@@ -18,6 +18,7 @@ use std::path::Path;
 
 use crate::export::ExportError;
 use crate::shape::Shape;
+use crate::unfinished;
 use branches::Point;
 use parts::Row;
 pub use study::{Study, Way};
@@ -113,14 +114,11 @@ pub fn run(folder: &Path, effort: &Effort, step: &(dyn Fn() + Sync)) -> Result<E
     let in_folder = |source| ExperimentError::Folder { path: folder.display().to_string(), source };
     let existed = folder.exists();
     std::fs::create_dir_all(folder).map_err(in_folder)?;
-    let made =
-        tempfile::Builder::new().prefix(".unfinished-").tempdir_in(folder).map_err(in_folder).and_then(
-            |staged| {
-                let found = fill(staged.path(), effort, step)?;
-                publish(staged.path(), folder).map_err(in_folder)?;
-                Ok(found)
-            },
-        );
+    let made = unfinished::Folder::within(folder).map_err(in_folder).and_then(|staged| {
+        let found = fill(staged.path(), effort, step)?;
+        publish(staged.path(), folder).map_err(in_folder)?;
+        Ok(found)
+    });
     if made.is_err() && !existed {
         // What still holds files stays: then it is no longer ours alone.
         let _ = std::fs::remove_dir(folder);

@@ -12,7 +12,7 @@ use image::{GrayImage, ImageFormat};
 use crate::calibration::{CalibrationError, StereoCamera};
 use crate::export::ExportError;
 use crate::output::write_together;
-use crate::unfinished::sweep;
+use crate::unfinished::{is_hidden, sweep};
 
 /// Why pairs are not recorded.
 #[derive(Debug, thiserror::Error)]
@@ -60,9 +60,16 @@ impl Recording {
     ) -> Result<Self, RecordError> {
         let path = || folder.to_path_buf();
         let failed = |source| RecordError::Folder { path: path(), source };
-        sweep(folder);
-        if folder.exists() && std::fs::read_dir(folder).map_err(failed)?.next().is_some() {
-            return Err(RecordError::NotEmpty { path: path() });
+        let names =
+            || std::fs::read_dir(folder)?.map(|entry| Ok(entry?.file_name())).collect::<io::Result<Vec<_>>>();
+        if folder.exists() {
+            // A folder that holds anything else is refused, and stays as it is.
+            if names().map_err(failed)?.iter().all(|name| is_hidden(name)) {
+                sweep(folder);
+            }
+            if !names().map_err(failed)?.is_empty() {
+                return Err(RecordError::NotEmpty { path: path() });
+            }
         }
         Ok(Self { folder: path(), calibration })
     }
@@ -143,6 +150,17 @@ mod tests {
         }
         let error = Recording::begin(&folder, Some((camera, None))).unwrap_err().to_string();
         assert!(error.contains("not empty"), "{error}");
+        let left = folder.join(".unfinished-left.ossature");
+        let leave = || {
+            let file = std::fs::File::create(&left).unwrap();
+            file.set_modified(std::time::SystemTime::UNIX_EPOCH).unwrap();
+        };
+        leave();
+        assert!(Recording::begin(&folder, None).is_err() && left.exists(), "what is refused is not touched");
+        std::fs::remove_dir_all(&folder).unwrap();
+        std::fs::create_dir(&folder).unwrap();
+        leave();
+        assert!(Recording::begin(&folder, None).is_ok() && !left.exists());
         let board = parent.path().join("board");
         Recording::begin(&board, None).unwrap().add(1, &[view(1, 0), view(1, 1)]).unwrap();
         assert_eq!(std::fs::read_dir(board).unwrap().count(), 2);

@@ -21,7 +21,7 @@ use crate::batch::job::Job;
 use crate::batch::queue::{Outcome, Queue, QueueError, Record, Taken};
 use crate::export::ExportError;
 use crate::reconstruct::Workspace;
-use crate::unfinished::sweep_older;
+use crate::unfinished::sweep;
 
 /// Longest that is waited for a job, or for a server that is away, before anything else is looked at.
 const LOOK: Duration = Duration::from_millis(250);
@@ -213,7 +213,7 @@ impl Worker<'_> {
         }
         let out = &self.args.out;
         if taken.tries > 1 {
-            sweep_older(&out.join(&job.name), Duration::ZERO);
+            sweep(&out.join(&job.name));
         }
         let recipe = recipe(&mut bench.recipe, &job.how, self.folder, out)?;
         let id = job.id(self.folder, &recipe.sum).map_err(Failure::from)?;

@@ -35,6 +35,18 @@ impl Identity {
         Self { name, bus, index, serial }
     }
 
+    /// The same, without a serial number that another of the cameras that are there has too: once one of them is gone,
+    /// the number would look like the other's own.
+    #[must_use]
+    pub fn among(mut self, there: &[Self]) -> Self {
+        let twin =
+            |other: &Self| other.bus != self.bus && other.name == self.name && other.serial == self.serial;
+        if there.iter().any(twin) {
+            self.serial = None;
+        }
+        self
+    }
+
     /// Which of these cameras it is: the one at its place, unless that says that it is another; else the only one with
     /// its serial number.
     #[must_use]
@@ -75,6 +87,19 @@ mod tests {
         let plain = camera("usb-1", "");
         assert_eq!(plain.find(&[camera("usb-2", ""), camera("usb-1", "")]), Some(1));
         assert_eq!(plain.find(&[camera("usb-2", ""), other_node, other_kind]), None);
+    }
+
+    #[test]
+    fn a_twin_that_was_there_before_is_not_taken_for_the_lost_one() {
+        let (lost, twin, other) = (camera("usb-1", "A7"), camera("usb-2", "A7"), camera("usb-3", "B1"));
+        let known = lost.clone().among(&[lost.clone(), twin.clone(), other.clone()]);
+        assert_eq!(known.find(std::slice::from_ref(&twin)), None);
+        assert_eq!(known.find(&[twin, lost.clone()]), Some(1));
+        // Its own other node and another kind are no twins.
+        let metadata = Identity { index: Some(1), ..lost.clone() };
+        let microscope = Identity { name: "microscope".into(), bus: "usb-4".into(), ..lost.clone() };
+        let alone = lost.clone().among(&[lost.clone(), metadata, microscope, other]);
+        assert_eq!(alone.find(&[camera("usb-2", "A7")]), Some(0));
     }
 
     #[cfg(unix)]

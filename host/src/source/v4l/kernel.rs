@@ -115,6 +115,12 @@ impl Kernel {
         Ok(())
     }
 
+    /// Looks for cameras that have the same serial number, so that none is taken for this one when it is unplugged.
+    pub fn tell_apart(&mut self) {
+        let (there, _) = cameras();
+        self.identity = self.identity.clone().among(&there);
+    }
+
     /// Its exposure, if it has controls for it. The node is opened once more, so that it can be set while pictures are
     /// taken.
     #[must_use]
@@ -177,16 +183,16 @@ impl Device for Kernel {
     fn find_again(&mut self) -> bool {
         end(self.stream.take());
         self.device = None;
-        let look = |path: PathBuf| {
-            let can = v4l::Device::with_path(&path).ok()?.query_caps().ok()?;
-            lacks(&can).is_none().then(|| (identity(&path, &can), path))
-        };
-        let (there, paths): (Vec<_>, Vec<_>) = nodes().into_iter().filter_map(look).unzip();
+        let (there, paths) = cameras();
         let Some(place) = self.identity.find(&there) else { return false };
         // One that has just come may not be ready yet, and is looked for again.
         let opened = Self::open(&paths[place])
             .and_then(|mut found| self.choice.map_or(Ok(()), |choice| found.set(&choice)).map(|()| found));
-        opened.map(|found| *self = found).is_ok()
+        let Ok(mut found) = opened else { return false };
+        // What tells it apart was judged when all were there.
+        found.identity = self.identity.clone();
+        *self = found;
+        true
     }
 }
 
@@ -216,6 +222,15 @@ fn lacks(can: &Capabilities) -> Option<&'static str> {
 
 fn identity(path: &Path, can: &Capabilities) -> Identity {
     Identity::of(path, (can.card.clone(), can.bus.clone()), Path::new(SYSTEM))
+}
+
+/// The cameras that are there, and their nodes.
+fn cameras() -> (Vec<Identity>, Vec<PathBuf>) {
+    let look = |path: PathBuf| {
+        let can = v4l::Device::with_path(&path).ok()?.query_caps().ok()?;
+        lacks(&can).is_none().then(|| (identity(&path, &can), path))
+    };
+    nodes().into_iter().filter_map(look).unzip()
 }
 
 /// Hands the kernel all buffers but the first, which follows when the first frame is taken. A driver may have

@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! kernel (or a simulated device) -> watch: stalls restarted, broken frames left out, one that was unplugged
-//!     waited for -> pair: one frame that holds both eyes, or two that belong together -> live: the newest pair waits, older ones are dropped
-//!     -> layout and format: grey views
+//!     waited for -> pair: one frame that holds both eyes, or two that belong together
+//!     -> live: the newest pair waits, older ones are dropped -> layout and format: grey views
 //! ```
 //!
 //! Everything but [`kernel`] works on the trait [`device::Device`], and is tested with a simulated one that

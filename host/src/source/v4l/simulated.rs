@@ -48,6 +48,8 @@ pub(crate) struct Simulated {
     pub(crate) has_clock: bool,
     /// How often it was started.
     pub(crate) starts: u32,
+    /// How often it was looked for.
+    pub(crate) looks: u32,
     /// How long it was waited for in vain.
     pub(crate) waited: Duration,
     /// Real time that each frame takes, and that passes until it is pulled out.
@@ -64,6 +66,7 @@ impl Simulated {
             sequence: 0,
             has_clock: true,
             starts: 0,
+            looks: 0,
             waited: Duration::ZERO,
             pace: Duration::ZERO,
         }
@@ -142,6 +145,7 @@ impl Device for Simulated {
 
     fn find_again(&mut self) -> bool {
         self.running = false;
+        self.looks += 1;
         match self.script.front_mut() {
             Some(Event::Unplugged(0, path)) => {
                 self.path = (*path).into();

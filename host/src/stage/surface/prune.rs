@@ -169,7 +169,8 @@ fn end_by_ball(group: &Group, end: Lanes, rival: Rival, offset: Vectors, reach: 
     let gradient = all(rival.gradient);
     let far = Lanes::splat(rival.from_centre);
     let square = far * far;
-    let bend = Lanes::splat(reach * reach / rival.from_centre.max(f32::MIN_POSITIVE));
+    // Never infinite, as nothing times that is no number; and still more than any way across the region.
+    let bend = Lanes::splat(reach * reach / rival.from_centre.max(1e-6));
     let p = less(plus(group.middle, offset), group.axis, end);
     let own = dot(p, p);
     let larger = group.radius + group.slope * end - Lanes::splat(rival.radius);
