@@ -365,11 +365,15 @@ fn what_is_suspicious_about_a_file_is_told_with_its_refusal() {
 #[test]
 fn wrong_usage_is_2() {
     let folder = TempDir::new().unwrap();
-    let wrong: [&[&str]; 17] = [
+    let wrong: [&[&str]; 21] = [
         &["fly"],
         &["replay"],
         &["replay", "a", "b", "--omega", "4", "--mode", "paper"],
         &["replay", "a", "b", "--omega", "2"],
+        &["replay", "a", "b", "--front", "auto", "--mode", "paper"],
+        &["replay", "a", "b", "--front", "grey", "--background", "first"],
+        &["replay", "a", "b", "--front", "auto", "--background", "desk.png"],
+        &["capture", "--front", "auto", "--background", "first"],
         &["replay", "a", "b", "--threshold", "256"],
         &["replay", "a", "b", "--polarity", "grey"],
         &["replay", "a", "b", "--resolution", "0"],

@@ -1,7 +1,7 @@
 //! What the measured front brings, and where it does not: every built-in shape, looking every way, by balls, by grey
 //! levels and by both as they are trusted; and whether the confidence of a vertex says how far it is off.
 //!
-//! `cargo run --release -p system-tests --example front` prints the tables of docs/numbers.md.
+//! `cargo run --release -p system-tests --example front` prints the tables.
 
 use host::bvh::Bvh;
 use host::evaluate::{Options as Ruler, evaluate};
@@ -31,7 +31,7 @@ fn vertices(made: &Reconstruction, truth: &Mesh) -> Vec<(f64, f64, bool)> {
     made.mesh.vertices.par_iter().zip(&front.confidence).map(vertex).collect()
 }
 
-/// How many times the mean error of the most confident fifth that of the least confident fifth is.
+/// The mean error of the least confident fifth over that of the most confident one.
 fn ratio(mut vertices: Vec<(f64, f64, bool)>) -> f64 {
     vertices.sort_by(|a, b| a.0.total_cmp(&b.0));
     let fifth = vertices.len() / 5;

@@ -53,6 +53,18 @@ fn off_in_depth(mesh: &Mesh) -> f64 {
     all.iter().sum::<f64>() / all.len() as f64
 }
 
+/// Symmetric mean distance, % of the diagonal.
+fn error(model: &Mesh, truth: &Mesh) -> f64 {
+    let ruler = Ruler { samples: 5000, grid: 2, sections: 1, seed: 0 };
+    evaluate::<Pinhole>(model, truth, &[], &ruler).distance.unwrap().symmetric.mean_pct
+}
+
+/// The pair, with other grey levels in the right image.
+fn right_by([left, mut right]: Pair, level: impl Fn(u8) -> u8) -> Pair {
+    right.iter_mut().for_each(|grey| *grey = level(*grey));
+    [left, right]
+}
+
 /// The look of this name.
 fn look(name: &str) -> Look {
     Look::all().into_iter().find(|look| look.name == name).unwrap()
@@ -68,6 +80,50 @@ fn an_elliptical_cross_section_is_recovered_from_shading_and_from_marks() {
         assert!(balls > 5.0, "{name}: balls are off by {balls:.2} mm");
         assert!(grey < part * balls, "{name}: {grey:.2} of {balls:.2} mm");
         assert!(auto < 1.2 * part * balls, "{name}: {auto:.2} of {balls:.2} mm");
+    }
+}
+
+#[test]
+fn a_right_eye_that_sees_half_as_bright_is_no_hindrance() {
+    let pair = right_by(look("clouds").see(&ellipsoid()), |grey| grey / 2);
+    let [balls, auto] = [Front::Balls, Front::Auto].map(|front| made(&pair, front));
+    let gain = auto.front.unwrap().gain;
+    let [balls, auto] = [balls.mesh, auto.mesh].map(|mesh| off_in_depth(&mesh));
+    println!("gain {gain:.3}: balls {balls:.2} mm, auto {auto:.2} mm");
+    assert!((gain - 2.0).abs() < 0.1, "{gain}");
+    assert!(auto < 0.2 * balls, "{auto:.2} of {balls:.2} mm");
+}
+
+#[test]
+fn eyes_that_contradict_each_other_everywhere_leave_the_balls_as_they_are() {
+    let mut held = 0;
+    for (k, level) in [|g: u8| g / 8, |g: u8| g / 10 + 3, |g: u8| if g < 60 { g } else { 255 - g / 2 }]
+        .into_iter()
+        .enumerate()
+    {
+        let pair = right_by(look("matte").pair(Shape::Teapot), level);
+        let [balls, auto] = [Front::Balls, Front::Auto].map(|front| made(&pair, front));
+        let front = auto.front.unwrap();
+        println!(
+            "{k}: distrusted {:.3}, gain {:.2}, offset {:.1}",
+            front.distrusted, front.gain, front.offset
+        );
+        if front.distrusted == 1.0 {
+            held += 1;
+            assert_eq!(front.share, 0.0);
+            assert!(auto.mesh.vertices == balls.mesh.vertices, "{k}");
+        }
+    }
+    assert!(held > 0);
+}
+
+#[test]
+fn highlights_do_not_mislead_what_is_trusted() {
+    for shape in [Shape::Sphere, Shape::Torus] {
+        let (pair, truth) = (look("glossy").pair(shape), shape.mesh(shape.cell()));
+        let [balls, auto] = [Front::Balls, Front::Auto].map(|front| error(&made(&pair, front).mesh, &truth));
+        println!("{shape}: balls {balls:.3}, auto {auto:.3} %");
+        assert!(auto <= balls + 0.03, "{shape}: {auto:.3} against {balls:.3} %");
     }
 }
 

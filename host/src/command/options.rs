@@ -133,6 +133,10 @@ impl MethodArgs {
                 "--skeleton, --radius and --surface belong to --mode default; the paper has its own",
             ));
         }
+        let front = self.front.unwrap_or_default();
+        if front != Front::Balls && self.mode == Mode::Paper {
+            return Err(usage("--front grey and auto belong to --mode default; the paper has balls alone"));
+        }
         Ok(Options {
             mode,
             thinning: self.thinning,
@@ -141,7 +145,7 @@ impl MethodArgs {
             branches: self.branches,
             radius: grow.radius.unwrap_or_default(),
             pieces: grow.surface.unwrap_or_default(),
-            front: self.front.unwrap_or_default(),
+            front,
             threshold: self.threshold,
             polarity: self.polarity,
             cell: grow.resolution,
@@ -279,6 +283,12 @@ impl SceneArgs {
     pub fn scene(&self, layout: Option<Layout>, swap: bool, options: &mut Options) -> Result<Scene, Failure> {
         if self.background.is_some() && options.polarity != Polarity::BrightObject {
             return Err(usage("with --background the object is what is bright: leave --polarity out"));
+        }
+        if self.background.is_some() && options.front != Front::Balls {
+            return Err(usage(
+                "--front grey and auto compare grey levels, and a background taken away changes them; leave one of \
+                 them out",
+            ));
         }
         let named = self.background.as_ref().filter(|_| !self.takes_first());
         let views = named.map(|named| scene::background(named, layout)).transpose();

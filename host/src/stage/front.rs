@@ -3,7 +3,8 @@
 //!
 //! * **In**: a closed mesh in rectified axes, mm, both rectified images, and the masks of the object in them.
 //! * **Out**: the same faces, with their vertices moved along the rays of the left eye, and how much is known of each.
-//! * **The back** is not seen and stays as balls have it, and so does the outline, which is measured already.
+//! * **The back** is not seen and stays as balls have it, but for a little where one limb hides another. So does the
+//!   left outline, which is measured already.
 //! * **Promise**: the mesh stays closed and manifold; the same bits for any number of threads.
 //! * **Cost**: about the pixels of the object, some thousand operations each.
 //!
@@ -57,7 +58,7 @@ pub struct Sight<'a> {
 pub struct Measured {
     /// How well each vertex of the mesh is known, 0 to 1.
     pub confidence: Vec<f64>,
-    /// Part of the left view of the object whose depth both eyes tell.
+    /// Part of the left view of the object whose depth both eyes tell better than balls.
     pub share: f64,
     /// Part of it that was not trusted and left to balls.
     pub distrusted: f64,
@@ -93,10 +94,10 @@ pub fn measure(mesh: &mut Mesh, sight: &Sight<'_>, gated: bool) -> Measured {
     };
     Measured {
         confidence: confidence::of_vertices(&field, &images[0], &behind),
-        share: share(&|node| field.known[node] > 0.0),
+        share: share(&|node| field.is_measured(node)),
         distrusted: share(&|node| field.held[node]),
         noise,
-        residuals: field.residuals,
+        residuals: field.spreads,
         gain: field.response.gain,
         offset: field.response.offset,
         rows: field.response.rows,
@@ -117,10 +118,11 @@ fn view(mesh: &Mesh, images: &[[f64; 3]], image: &GrayImage, mask: &Bitmap<'_>, 
     let size = [image.width() as i32, image.height() as i32];
     let side = |axis: usize| {
         let all = || images.iter().map(|image| image[axis]);
-        let low = all().fold(f64::INFINITY, f64::min).floor() as i32 - AROUND;
-        let high = all().fold(f64::NEG_INFINITY, f64::max).ceil() as i32 + AROUND;
-        let low = low.clamp(0, size[axis] - 2);
-        (low, (high.clamp(low + 1, size[axis] - 1) - low + 1) as usize)
+        let low = all().fold(f64::INFINITY, f64::min).floor() as i32;
+        let high = all().fold(f64::NEG_INFINITY, f64::max).ceil() as i32;
+        let low = low.saturating_sub(AROUND).clamp(0, (size[axis] - 2).max(0));
+        let high = high.saturating_add(AROUND).max(low + 1).min(size[axis] - 1);
+        (low, (high - low + 1) as usize)
     };
     let ((u, width), (v, height)) = (side(0), side(1));
     let frame = Frame { corner: [u, v], width, height };

@@ -65,7 +65,7 @@ impl Look {
         right.principal[1] += self.lower;
         let cameras = [(left, self.sensors[0]), (right, self.sensors[1])];
         let images = photograph(mesh, self.material, &cameras);
-        let mut images: [GrayImage; 2] = images.try_into().unwrap_or_default();
+        let mut images: [GrayImage; 2] = images.try_into().expect("one image a camera");
         if self.noise > 0.0 {
             for (image, seed) in images.iter_mut().zip(1..) {
                 Noise { sigma: self.noise, salt_and_pepper: 0.0, seed }.apply(image);

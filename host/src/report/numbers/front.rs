@@ -1,7 +1,6 @@
 //! The visible side: what of the model was measured, and what is inferred.
 
 use super::super::Run;
-use crate::reconstruct;
 use crate::stage::front::Measured;
 use serde::Serialize;
 
@@ -17,7 +16,7 @@ pub(super) struct Front {
 /// What the grey levels gave.
 #[derive(Serialize)]
 struct Grey {
-    /// Part of the left view of the object whose depth both eyes tell.
+    /// Part of the left view of the object whose depth both eyes tell better than balls.
     measured_share: f64,
     /// Part of it that was not trusted and stays as balls have it.
     distrusted_share: f64,
@@ -37,7 +36,7 @@ struct Grey {
 impl Front {
     pub(super) fn of(run: &Run<'_>) -> Self {
         let grey = run.reconstruction.front.as_ref().map(Grey::of);
-        let balls = grey.is_none() || run.options.front == reconstruct::Front::Balls;
+        let balls = run.reconstruction.front.as_ref().is_none_or(|measured| measured.share == 0.0);
         Self {
             measured: if balls {
                 "the outline, by both eyes"

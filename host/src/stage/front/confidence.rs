@@ -32,8 +32,10 @@ pub(super) fn of_vertices(field: &Field, images: &[[f64; 3]], behind: &[f64]) ->
         front[node] = 1.0 / (1.0 / off(FRONT) + 1.0 / measured);
         back[node] = off(BACK);
     }
+    // Away from all nodes nothing is known: no better than the worst of them.
+    let worst = lattice.nodes().map(|node| front[node].max(back[node])).reduce(f64::max).unwrap_or(f64::MAX);
     let confidence = |(&[u, v, _], &behind): (&[f64; 3], &f64)| {
-        let at = |squares: &[f64]| lattice.look_up(squares, [u, v]).unwrap_or(LEAST * LEAST);
+        let at = |squares: &[f64]| lattice.look_up(squares, [u, v]).unwrap_or(worst);
         let square = at(&front) * (1.0 - behind) + at(&back) * behind;
         1.0 / (1.0 + square.sqrt())
     };

@@ -14,7 +14,7 @@
 
 use super::lattice::{Lattice, RIM, Stencil};
 use super::picture::Picture;
-use super::stereo::{Response, Seen, View, look, respond, spread, visible};
+use super::stereo::{Response, View, look, respond, spread, visible};
 use super::system::System;
 use crate::mesh::Mesh;
 use crate::stage::rectify::RectifiedCamera;
@@ -43,8 +43,8 @@ const THIN: f64 = 3.0;
 
 /// Nodes around one, on each side, whose evidence counts.
 const AROUND: usize = 4;
-/// Logarithm of how many times likelier the displacement must make what is seen around a node: noise alone stays
-/// below 7 for nine nodes in ten.
+/// What the displacement must gain in log-likelihood around a node, as a score: neighbours in blurred images are not
+/// independent. Noise alone stays below 7 for nine nodes in ten.
 const EVIDENCE: f64 = 8.0;
 /// Least standard deviation of a residual for that, grey levels: rounding, after a blur.
 const ROUNDED: f64 = 0.1;
@@ -61,7 +61,7 @@ pub(super) struct Field {
     pub(super) held: Vec<bool>,
     pub(super) response: Response,
     /// Standard deviations of the residuals, grey levels: of the ball model, and of what was measured.
-    pub(super) residuals: [f64; 2],
+    pub(super) spreads: [f64; 2],
 }
 
 /// What a displacement is found from.
@@ -95,10 +95,13 @@ pub(super) fn measure(scene: &Scene<'_>) -> Field {
         field.refine(scene, &pictures(blur), rounds);
     }
     let sharpest = pictures(LEVELS[3].1);
-    field.weigh(scene, &sharpest);
+    let mut residuals = field.residuals(scene, &sharpest);
     if scene.gated {
+        field.gate(&residuals);
         field.refine(scene, &sharpest, GATED);
+        residuals = field.residuals(scene, &sharpest);
     }
+    field.spreads = spreads(&residuals);
     field
 }
 
@@ -116,7 +119,7 @@ impl Field {
             known: vec![0.0; lattice.on.len()],
             held: (0..lattice.on.len()).map(held).collect(),
             response: Response { gain: 1.0, offset: 0.0, rows: scene.rows },
-            residuals: [0.0; 2],
+            spreads: [0.0; 2],
             lattice,
         }
     }
@@ -164,9 +167,8 @@ impl Field {
         }
     }
 
-    /// Hold the displacements against the ball model: what either leaves unexplained, and, if gates are asked for, at
-    /// which nodes the ball model is to be held to.
-    fn weigh(&mut self, scene: &Scene<'_>, pictures: &[Picture; 2]) {
+    /// What the ball model and the displacements leave unexplained, grey levels, at the nodes where both can be told.
+    fn residuals(&self, scene: &Scene<'_>, pictures: &[Picture; 2]) -> Vec<(usize, [f64; 2])> {
         let lattice = &self.lattice;
         let visible = visible(lattice, scene);
         let see = |moved: &[f64]| {
@@ -174,35 +176,54 @@ impl Field {
             let seen = look(lattice, &visible, pictures, scene, (moved, &self.response));
             let response = respond(&seen, self.response, scene.rows);
             let seen = look(lattice, &visible, pictures, scene, (moved, &response));
-            let residual = |seen: &Seen| seen.counts.then(|| seen.residual(&response));
-            seen.iter().map(residual).collect::<Vec<_>>()
+            seen.iter().map(|seen| seen.counts.then(|| seen.residual(&response))).collect::<Vec<_>>()
         };
         let [balls, measured] = [see(&vec![0.0; self.moved.len()]), see(&self.moved)];
-        self.residuals = [&balls, &measured].map(|residuals| spread(residuals.iter().flatten().copied()));
-        if !scene.gated {
-            return;
-        }
-        let sigma = ROBUST * self.residuals[1].max(ROUNDED);
+        let both = |((&node, balls), measured): ((&usize, _), _)| {
+            Option::zip(balls, measured).map(|(b, m)| (node, [b, m]))
+        };
+        visible.iter().zip(balls).zip(measured).filter_map(both).collect()
+    }
+
+    /// Put the nodes back on the ball model where the residuals do not speak against it, and hold them to it.
+    fn gate(&mut self, residuals: &[(usize, [f64; 2])]) {
+        let sigma = ROBUST * spreads(residuals)[1].max(ROUNDED);
         let unlikely = |residual: f64| ROBUST * ROBUST / 2.0 * libm::log1p((residual / sigma).powi(2));
         let mut evidence = vec![0.0; self.moved.len()];
-        for ((&node, balls), measured) in visible.iter().zip(balls).zip(measured) {
-            if let (Some(balls), Some(measured)) = (balls, measured) {
-                evidence[node] = unlikely(balls) - unlikely(measured);
+        for &(node, [balls, measured]) in residuals {
+            evidence[node] = unlikely(balls) - unlikely(measured);
+        }
+        let evidence = self.lattice.sums_around(&evidence, AROUND);
+        for node in self.lattice.nodes() {
+            self.held[node] |= evidence[node] < EVIDENCE;
+            if self.held[node] {
+                self.moved[node] = 0.0;
             }
         }
-        let evidence = lattice.sums_around(&evidence, AROUND);
-        for node in lattice.nodes() {
-            self.held[node] |= evidence[node] < EVIDENCE;
-        }
     }
+
+    /// Whether stereo says more of a node than the ball model does.
+    pub(super) fn is_measured(&self, node: usize) -> bool {
+        self.known[node] > prior(&self.lattice, node, WEAK)
+    }
+}
+
+/// Standard deviations of both residuals.
+fn spreads(residuals: &[(usize, [f64; 2])]) -> [f64; 2] {
+    [0, 1].map(|of| spread(residuals.iter().map(|(_, both)| both[of])))
+}
+
+/// What the ball model weighs at a node, if it is trusted so `firm`ly.
+fn prior(lattice: &Lattice, node: usize, firm: f64) -> f64 {
+    let off = libm::hypot(OFF[0], OFF[1] * lattice.half[node]) / lattice.depth[node];
+    lattice.area() * firm * (lattice.unit[node] / off).powi(2)
 }
 
 /// The ball model, held to at the outline and where nothing speaks against it, and preferred elsewhere.
 fn trust_balls(lattice: &Lattice, moved: &[f64], held: &[bool], system: &mut System) {
     for node in lattice.nodes() {
-        let off = OFF[0].hypot(OFF[1] * lattice.half[node]) / lattice.depth[node];
         let firm = if lattice.rim[node] < RIM || held[node] { 1.0 } else { WEAK };
-        system.add(node, lattice.area() * firm * (lattice.unit[node] / off).powi(2), moved[node], 1.0);
+        system.add(node, prior(lattice, node, firm), moved[node], 1.0);
     }
 }
 

@@ -79,7 +79,7 @@ impl Lattice {
             depth[node] /= pixels;
             half[node] = (half[node] / pixels).max(THINNEST);
             rims[node] /= pixels;
-            unit[node] = half[node].hypot(SOFT) / depth[node].max(f64::MIN_POSITIVE);
+            unit[node] = libm::hypot(half[node], SOFT) / depth[node].max(f64::MIN_POSITIVE);
         });
         let on: Vec<bool> = count.iter().map(|&count| count >= least).collect();
         let stencils = stencils(width, &on, &depth, &rims, STEEPEST * step as f64 / focal);
@@ -125,18 +125,22 @@ impl Lattice {
 }
 
 /// The bilinear mean at a place of a raster, of the values that there are; of the first ring around that has any if
-/// there is none; none beyond three pixels.
+/// there is none; none beyond three pixels, nor at a place that is no number.
 pub(super) fn mean_near(
     [x, y]: [f64; 2],
     [width, height]: [usize; 2],
     value: impl Fn(usize) -> Option<f64>,
 ) -> Option<f64> {
+    if !x.is_finite() || !y.is_finite() {
+        return None;
+    }
     let (column, row) = (x.floor() as i32, y.floor() as i32);
     let (s, t) = (x - f64::from(column), y - f64::from(row));
     for reach in 0..=3 {
         let (mut sum, mut total) = (0.0, 0.0);
-        for j in row - reach..=row + 1 + reach {
-            for i in column - reach..=column + 1 + reach {
+        let around = |middle: i32| middle.saturating_sub(reach)..=middle.saturating_add(1 + reach);
+        for j in around(row) {
+            for i in around(column) {
                 if i < 0 || j < 0 || i as usize >= width || j as usize >= height {
                     continue;
                 }
@@ -205,7 +209,7 @@ pub(super) fn rim(set: &[bool], width: usize, reach: usize) -> Vec<f64> {
             let column = u as i64 + du;
             let inside = column >= 0 && column < width as i64;
             let below = if inside { down[row + column as usize] } else { 0.0 };
-            below.hypot(du as f64)
+            libm::hypot(below, du as f64)
         };
         let reach = reach as i64;
         if set[place] { (-reach..=reach).map(across).fold(most, f64::min) } else { 0.0 }

@@ -17,6 +17,8 @@ use nalgebra::{Matrix4, Vector3, Vector4};
 
 /// Every so many pixels one is looked at.
 const EVERY: i32 = 3;
+/// Fewest pixels that a law is fitted to: where nearly all are full, nothing is said to shine.
+const FEWEST: usize = 50;
 /// Rounds of reweighting.
 const ROUNDS: usize = 10;
 /// Blur against noise, px.
@@ -69,7 +71,8 @@ fn spread_by_normals(cores: &[bool], view: &View, mesh: &Mesh, spoilt: &mut [boo
     }
 }
 
-/// The brightest that a dull surface of this object would be, and the standard deviation from that law.
+/// The brightest that a dull surface of this object would be, and the standard deviation from that law; none where too
+/// few pixels tell it.
 fn limit(view: &View, mesh: &Mesh) -> Option<(f64, f64)> {
     let seen = |(place, [u, v]): (usize, [i32; 2])| {
         let (face, level) = (view.depths.face[place], view.picture.levels[place]);
@@ -78,7 +81,10 @@ fn limit(view: &View, mesh: &Mesh) -> Option<(f64, f64)> {
         (plain && level < FULL && view.rim.levels[place] >= 3.0).then(|| (normal().push(1.0), level))
     };
     let samples: Vec<(Vector4<f64>, f64)> =
-        view.picture.frame.pixels().enumerate().filter_map(seen).filter(|(n, _)| n.x.is_finite()).collect();
+        view.picture.frame.pixels().enumerate().filter_map(seen).collect();
+    if samples.len() < FEWEST {
+        return None;
+    }
     let mut law = Vector4::zeros();
     let mut deviation = f64::INFINITY;
     for _ in 0..ROUNDS {

@@ -32,15 +32,15 @@ impl Picture {
     /// The level at a place, bilinear; beyond the frame that of its border.
     pub(super) fn at(&self, u: f64, v: f64) -> f64 {
         let Frame { corner, width, height } = self.frame;
-        let x = (u - f64::from(corner[0])).clamp(0.0, width as f64 - 1.001);
-        let y = (v - f64::from(corner[1])).clamp(0.0, height as f64 - 1.001);
+        let x = (u - f64::from(corner[0])).clamp(0.0, width as f64 - 1.0);
+        let y = (v - f64::from(corner[1])).clamp(0.0, height as f64 - 1.0);
         let (column, row) = (x as usize, y as usize);
         let (s, t) = (x - column as f64, y - row as f64);
-        let at = |k: usize| {
-            let place = (row + k) * width + column;
-            self.levels[place] * (1.0 - s) + self.levels[place + 1] * s
+        let at = |row: usize| {
+            let level = |column: usize| self.levels[row * width + column];
+            level(column) * (1.0 - s) + level((column + 1).min(width - 1)) * s
         };
-        at(0) * (1.0 - t) + at(1) * t
+        at(row) * (1.0 - t) + at((row + 1).min(height - 1)) * t
     }
 }
 

@@ -20,7 +20,7 @@ pub(super) struct Frame {
 impl Frame {
     /// The place of a pixel in lists row by row, if it is inside.
     pub(super) fn place(&self, u: i32, v: i32) -> Option<usize> {
-        let (x, y) = (u - self.corner[0], v - self.corner[1]);
+        let (x, y) = (u.saturating_sub(self.corner[0]), v.saturating_sub(self.corner[1]));
         let inside = x >= 0 && y >= 0 && (x as usize) < self.width && (y as usize) < self.height;
         inside.then(|| y as usize * self.width + x as usize)
     }

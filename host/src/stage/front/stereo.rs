@@ -133,7 +133,7 @@ pub(super) fn look(
 /// Rounds of reweighting.
 const ROUNDS: usize = 4;
 /// Farthest from 1 that a gain goes, as a factor.
-const MOST_GAIN: f64 = 1.5;
+const MOST_GAIN: f64 = 4.0;
 /// What the rows may be moved by at a time, and from what is known of them, px.
 const MOST_ROWS: [f64; 2] = [0.1, 0.75];
 /// How firmly gain and rows stay as they are: so many pixels of slope 1 would say so.
@@ -157,8 +157,9 @@ pub(super) fn respond(seen: &[Seen], from: Response, known_rows: f64) -> Respons
         }
         let Some(solved) = normal.cholesky().map(|factors| factors.solve(&right)) else { return from };
         best.gain = solved[0].clamp(MOST_GAIN.recip(), MOST_GAIN);
-        best.offset = solved[1];
         moved = solved[2].clamp(-MOST_ROWS[0], MOST_ROWS[0]);
+        // The offset that suits what was clamped.
+        best.offset = (right[1] - normal[(1, 0)] * best.gain - normal[(1, 2)] * moved) / normal[(1, 1)];
     }
     best.rows = (from.rows + moved).clamp(known_rows - MOST_ROWS[1], known_rows + MOST_ROWS[1]);
     best

@@ -3,8 +3,9 @@
 //! * **In**: a mesh in rectified axes, the depths of its first stretch along the left rays, and the change of ln depth
 //!   there. **Out**: its vertices, moved along their rays so that the stretch [near, far] becomes [near', far]: its
 //!   beginning as measured, its end, and whatever lies behind, as it was.
-//! * **Promise**: the map is continuous, and along each ray it keeps the order of points: faces stay as they are, so
-//!   that a closed manifold mesh remains one.
+//! * **Promise**: along each ray the map keeps the order of points, and inside the outline it is continuous. Faces stay
+//!   as they are, so that a closed manifold mesh remains one; but where limbs hide one another, or the thickness
+//!   shrinks, faces may cross, and vertices of the back move a little.
 
 use super::lattice::mean_near;
 use super::raster::Depths;
