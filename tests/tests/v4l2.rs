@@ -254,17 +254,6 @@ fn a_camera_that_fails_or_goes_ends_the_run_and_leaves_whole_files() {
 
 #[test]
 #[ignore = "boots a machine: ./ci.sh v4l2"]
-fn a_camera_that_comes_back_under_another_node_is_found_again() {
-    let Some(machine) = machine() else { return };
-    let scenario = machine.scenario("returned");
-    assert_eq!((scenario.code, scenario.count("returns")), (0, 1), "{}", scenario.errors);
-    let found = "/dev/video0 is back as /dev/video4";
-    assert!(scenario.errors.contains(found) && scenario.pairs().len() >= 3, "{}", scenario.errors);
-    machine.assert_intact(&scenario);
-}
-
-#[test]
-#[ignore = "boots a machine: ./ci.sh v4l2"]
 fn what_cannot_be_is_refused_in_a_sentence_and_leaves_no_files() {
     let Some(machine) = machine() else { return };
     let refusals = [

@@ -36,12 +36,10 @@ capture() {
     echo $code >"$out/code"
 }
 
-# capture_while NAME WHAT ARGUMENT...: the same while something is done to camera 0 as soon as there is a model; ends by
-# itself.
+# The same while something is done to camera 0 as soon as there is a model; ends by itself.
 capture_while() {
     local name=$1 done=$2
-    shift 2
-    capture "$name" --device /dev/video0 --format GREY "$@" &
+    capture "$name" --device /dev/video0 --format GREY &
     await test -e "/out/$name/models/000001/model.ply"
     now >"/out/$name/begin"
     $done "$name"
@@ -157,25 +155,5 @@ disconnect() { control 0 disconnect=1; }
 capture_while disconnected disconnect
 capture gone --device /dev/video0 --format GREY
 cat /dev/video0 >/out/gone.witness 2>&1
-
-# Another driver's cameras in place of the first: at the same place, under other nodes. The capture is halted while they
-# are fed, lest it be seen what they show before.
-unfeed 0
-feed 0 $BESIDE GREY GREY
-replug() {
-    disconnect
-    await grep -q "waiting for it" "/out/$1/err"
-    kill -STOP "$(pidof host)"
-    unfeed 0
-    await rmmod vivid
-    # Options are words.
-    insmod /modules/vivid.ko $CAMERAS vid_cap_nr=4,6 vid_out_nr=5,7
-    control 4 osd_text_mode=2,loop_video=1
-    feed 4 $BESIDE GREY GREY
-    kill -CONT "$(pidof host)"
-    await more_models "$1" "$(($(ls "/out/$1/models" | wc -l) + 1))"
-    kill -INT "$(pidof host)"
-}
-capture_while returned replug --wait 60
 
 echo "$(now) end"
