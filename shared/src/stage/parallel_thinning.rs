@@ -340,17 +340,15 @@ impl Cut {
 fn delete<L: Lanes, S: Step>(now: &[Word], next: &mut [Word]) -> [Word; 5] {
     // As long as `next`, so that nobody has to look whether a row is there.
     let Some(below) = now.get(2..2 + next.len()) else { return [0; 5] };
-    // Of single words, two have been loaded for the rows before.
-    let rows = |v: usize, passed: [L; 2]| {
-        let [n, c] = if L::WORDS == 1 { passed } else { [L::load(now, v), L::load(now, v + 1)] };
-        [n, c, L::load(below, v)]
-    };
-    let mut three = rows(0, [L::load(now, 0), L::load(now, 1)]);
+    let mut three = [L::load(now, 0), L::load(now, 1), L::load(below, 0)];
     let first = delete_at::<L, S>(three, next, 0);
     let [mut all, mut last] = [first; 2];
     let mut v = L::WORDS;
     while v < next.len() {
-        three = rows(v, [three[1], three[2]]);
+        // Of single words, two have been loaded for the rows before.
+        let [_, n, c] = three;
+        let [n, c] = if L::WORDS == 1 { [n, c] } else { [L::load(now, v), L::load(now, v + 1)] };
+        three = [n, c, L::load(below, v)];
         last = delete_at::<L, S>(three, next, v);
         all = all | last;
         v += L::WORDS;
