@@ -2,6 +2,7 @@
 //! incoming one is full the host waits, so that nothing is lost.
 
 use super::Interrupts;
+use crate::endpoints::Known;
 use core::sync::atomic::{AtomicBool, Ordering};
 use embassy_futures::join::join3;
 use embassy_stm32::peripherals::{PA11, PA12, USB_OTG_FS};
@@ -43,7 +44,8 @@ pub(super) async fn task(
     config.serial_number = Some(embassy_stm32::uid::uid_hex());
     let (mut descriptors, mut bos, mut control) = ([0; 256], [0; 32], [0; 64]);
     let mut state = State::new();
-    let mut builder = Builder::new(driver, config, &mut descriptors, &mut bos, &mut [], &mut control);
+    let mut builder =
+        Builder::new(Known::new(driver), config, &mut descriptors, &mut bos, &mut [], &mut control);
     let class = CdcAcmClass::new(&mut builder, &mut state, PACKET as u16);
     let mut device = builder.build();
     let (mut sender, mut receiver) = class.split();
