@@ -86,7 +86,7 @@ fn how_fast_it_is() {
     let server = Server::start();
     let url = server.url();
     let batch = Batch { folder: &pairs, out: &made, server: &url, name: "speed", kind: FULL, tries: "5" };
-    println!("{} pairs, best of {}: replay, batch, ratio", TIMED, ROUNDS);
+    println!("{TIMED} pairs, best of {ROUNDS}: replay, batch, ratio");
     let [mut waiting, mut done] = [0; 2];
     let begun = server.time();
     for threads in [1, 2] {
@@ -130,8 +130,7 @@ fn thousands_of_pairs_with_twenty_kills() {
     let count = |name: &str| status[name].as_u64().unwrap() as usize;
     println!("{KILLS} workers killed, and the server once");
     println!(
-        "{} pairs: {} made, {} refused, {} set aside",
-        PAIRS,
+        "{PAIRS} pairs: {} made, {} refused, {} set aside",
         count("made"),
         count("refused"),
         count("set_aside")

@@ -183,9 +183,9 @@ impl BatchArgs {
         Ok(name.chars().map(|c| if is_plain(c) { c } else { '-' }).collect())
     }
 
-    fn server(&self) -> crate::batch::queue::Server {
+    fn server(&self) -> crate::batch::server::Server {
         let identity = self.cert.clone().zip(self.key.clone()).map(<[PathBuf; 2]>::from);
-        crate::batch::queue::Server {
+        crate::batch::server::Server {
             url: self.server.clone(),
             credentials: self.creds.clone(),
             authority: self.ca.clone(),

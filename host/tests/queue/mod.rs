@@ -148,14 +148,17 @@ fn serve(storage: &Path, port: u16) -> Child {
     command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
     let process = command.spawn().expect("nats-server (Debian: apt-get install nats-server)");
     let end = Instant::now() + PATIENCE;
-    loop {
-        let greeted = TcpStream::connect(("127.0.0.1", port)).and_then(|mut stream| stream.read(&mut [0; 4]));
-        if greeted.is_ok_and(|bytes| bytes > 0) {
-            return process;
-        }
+    while !greets(port) {
         assert!(Instant::now() < end, "nats-server did not start");
         sleep(Duration::from_millis(50));
     }
+    process
+}
+
+/// Whether a server says hello.
+fn greets(port: u16) -> bool {
+    let greeted = TcpStream::connect(("127.0.0.1", port)).and_then(|mut stream| stream.read(&mut [0; 4]));
+    greeted.is_ok_and(|bytes| bytes > 0)
 }
 
 fn end(process: &mut Child) {

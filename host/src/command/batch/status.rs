@@ -5,7 +5,8 @@ use serde_json::json;
 use super::super::table::{Table, count};
 use super::super::{Failure, say, say_json};
 use super::BatchArgs;
-use crate::batch::queue::{Progress, Queue};
+use crate::batch::queue::Queue;
+use crate::batch::record::Progress;
 
 /// Tells how far a batch is.
 pub(super) fn run(args: &BatchArgs, json: bool) -> Result<(), Failure> {

@@ -12,7 +12,8 @@ use super::super::{Everywhere, Failure, note, replay, say, say_json};
 use super::SubmitArgs;
 use super::recipe::{Recipe, words};
 use crate::batch::job::Job;
-use crate::batch::queue::{Queue, Submitted};
+use crate::batch::queue::Queue;
+use crate::batch::record::Submitted;
 
 /// Queues every pair of a folder.
 pub(super) fn run(args: &SubmitArgs, everywhere: &Everywhere, json: bool) -> Result<(), Failure> {

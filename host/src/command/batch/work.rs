@@ -18,7 +18,9 @@ use super::super::{Failure, crew, interruption, note, replay, say, say_json, wor
 use super::WorkArgs;
 use super::recipe::Recipe;
 use crate::batch::job::Job;
-use crate::batch::queue::{Outcome, Queue, QueueError, Record, Taken};
+use crate::batch::queue::{Queue, Taken};
+use crate::batch::record::{Outcome, Record};
+use crate::batch::server::QueueError;
 use crate::export::ExportError;
 use crate::reconstruct::Workspace;
 use crate::unfinished::sweep;

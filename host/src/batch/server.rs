@@ -1,0 +1,149 @@
+//! The server that a queue is on: how it is reached, and what it may not do.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use async_nats::jetstream::{self, Context};
+use async_nats::{ConnectErrorKind, ConnectOptions, ServerAddr};
+use tokio::runtime::{self, Runtime};
+
+/// How long a server may take for an answer.
+pub(super) const ANSWER: Duration = Duration::from_secs(5);
+
+/// Where a server is, and how it knows us and we it.
+#[derive(Clone, Debug)]
+pub struct Server {
+    /// Its address, with user and password if it asks for them.
+    pub url: String,
+    /// A file with credentials.
+    pub credentials: Option<PathBuf>,
+    /// A certificate of the authority that it is believed by; then nothing is said in the clear.
+    pub authority: Option<PathBuf>,
+    /// Our certificate and its key.
+    pub identity: Option<[PathBuf; 2]>,
+}
+
+/// Why a queue did not do what it was asked.
+#[derive(Debug, thiserror::Error)]
+pub enum QueueError {
+    /// Nobody answers.
+    #[error(
+        "there is no NATS server at {url}: start one with `nats-server -js -sd FOLDER` (Debian: apt-get install \
+         nats-server), or name another with --server"
+    )]
+    NoServer {
+        /// Where it was looked for, without a password.
+        url: String,
+        /// What the client said.
+        source: async_nats::Error,
+    },
+    /// It lets us not in, or we do not believe it.
+    #[error(
+        "the NATS server at {url} and this machine do not trust each other: give user and password in --server, or \
+         --creds, and the authority of its certificate by --ca"
+    )]
+    Stranger {
+        /// Where it is, without a password.
+        url: String,
+        /// What the client said.
+        source: async_nats::Error,
+    },
+    /// A server of another kind, or set up otherwise.
+    #[error("the NATS server keeps no streams: start it with JetStream, `nats-server -js -sd FOLDER`")]
+    NoStreams,
+    /// There is no such batch.
+    #[error(
+        "there is no batch {name} on this server: queue its pairs with `host batch submit DIR`, or give its --name"
+    )]
+    NoBatch {
+        /// What it was called.
+        name: String,
+    },
+    /// What a file holds.
+    #[error("cannot use {}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// Anything else.
+    #[error("the NATS server did not do as it was asked")]
+    Server {
+        /// What the client said.
+        source: async_nats::Error,
+    },
+}
+
+impl QueueError {
+    /// Anything that has no sentence of its own.
+    pub(super) fn server(error: impl Into<async_nats::Error>) -> Self {
+        Self::Server { source: error.into() }
+    }
+}
+
+/// A client of the server, and what runs it.
+pub(super) fn connect(server: &Server) -> Result<(Runtime, Context), QueueError> {
+    let runtime = runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build();
+    let runtime = runtime.map_err(QueueError::server)?;
+    let context: Result<_, QueueError> = runtime.block_on(async {
+        let mut options =
+            ConnectOptions::new().name("ossature").connection_timeout(ANSWER).max_reconnects(None);
+        if let Some(path) = &server.credentials {
+            let read = options.credentials_file(path).await;
+            options = read.map_err(|source| QueueError::File { path: path.clone(), source })?;
+        }
+        if let Some(path) = &server.authority {
+            options = options.add_root_certificates(path.clone()).require_tls(true);
+        }
+        if let Some([certificate, key]) = &server.identity {
+            options = options.add_client_certificate(certificate.clone(), key.clone());
+        }
+        // The client itself passes over what an address says of the user.
+        if let Ok(address) = server.url.parse::<ServerAddr>()
+            && let (Some(user), Some(password)) = (address.username(), address.password())
+        {
+            options = options.user_and_password(user.into(), password.into());
+        }
+        let url = without_password(&server.url);
+        let client = options.connect(&server.url).await.map_err(|error| match error.kind() {
+            ConnectErrorKind::Authentication
+            | ConnectErrorKind::AuthorizationViolation
+            | ConnectErrorKind::Tls => QueueError::Stranger { url, source: error.into() },
+            _ => QueueError::NoServer { url, source: error.into() },
+        })?;
+        let mut context = jetstream::new(client);
+        context.set_timeout(ANSWER);
+        Ok(context)
+    });
+    Ok((runtime, context?))
+}
+
+/// An address as it may be shown.
+fn without_password(url: &str) -> String {
+    let (scheme, rest) = url.split_once("://").unwrap_or(("nats", url));
+    format!("{scheme}://{}", rest.rsplit('@').next().unwrap_or_default())
+}
+
+/// Why a stream cannot be had.
+pub(super) fn no_streams(error: impl Into<async_nats::Error>) -> QueueError {
+    let source = error.into();
+    let causes = std::iter::successors(Some(&*source as &dyn std::error::Error), |error| error.source());
+    let says = causes.map(|error| error.to_string()).collect::<Vec<_>>().join(": ");
+    if ["unavailable", "not enabled", "resource does not exist"].iter().any(|word| says.contains(word)) {
+        QueueError::NoStreams
+    } else {
+        QueueError::Server { source }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_password_is_never_told() {
+        assert_eq!(without_password("nats://me:secret@there:4222"), "nats://there:4222");
+        assert_eq!(without_password("there:4222"), "nats://there:4222");
+    }
+}
