@@ -28,6 +28,7 @@ pub mod calibration;
 
 // What happens to it.
 pub mod memory;
+mod lanes;
 pub mod wide;
 pub mod runs;
 pub mod stage;

@@ -1,17 +1,22 @@
-//! The core's inner loops in the widest registers that this machine has.
+//! Inner loops in the widest registers that this machine has: the core's, and the surface's.
 //!
-//! What a register holds is told by [`Lanes`](shared::lanes::Lanes); the loops are the core's own, compiled once
-//! more for each width. The only place of the host that is `unsafe`: registers may be used only where the machine
-//! has them, which is asked for once.
+//! What a register holds is told by [`Lanes`](shared::lanes::Lanes), and of numbers by `lanes.rs`; the loops are
+//! compiled once more for each width. The only place of the host that is `unsafe`: registers may be used only where
+//! the machine has them.
 
 #![expect(unsafe_code, reason = "the compiler cannot know which registers the machine has")]
 
-use ::wide::u8x16;
+#[cfg(all(target_arch = "x86_64", target_pointer_width = "64"))]
+mod numbers;
+
+use ::wide::{f32x8, u8x16};
 use shared::bitmap::{Bitmap, Size, WORD_BITS, Word};
 use shared::limits::CapacityError;
 use shared::pack::pack_by;
 use shared::pipeline::Kernels;
 use shared::stage::parallel_thinning::Thin;
+
+use crate::lanes::Work;
 
 /// What this machine does best.
 pub fn kernels() -> Kernels {
@@ -38,12 +43,7 @@ fn packed(bytes: &[u8; WORD_BITS]) -> Word {
 /// Thinning in registers wider than a word, the narrowest first, where this machine has them.
 #[cfg(all(target_arch = "x86_64", target_pointer_width = "64"))]
 pub fn widths() -> [(&'static str, Option<Thin>); 2] {
-    // Every machine with these registers has these instructions on words too.
-    let avx2 = is_x86_feature_detected!("avx2")
-        && is_x86_feature_detected!("bmi1")
-        && is_x86_feature_detected!("bmi2")
-        && is_x86_feature_detected!("lzcnt")
-        && is_x86_feature_detected!("popcnt");
+    let avx2 = has_avx2();
     let avx512 = avx2
         && is_x86_feature_detected!("avx512f")
         && is_x86_feature_detected!("avx512bw")
@@ -56,6 +56,27 @@ pub fn widths() -> [(&'static str, Option<Thin>); 2] {
 #[cfg(not(all(target_arch = "x86_64", target_pointer_width = "64")))]
 pub fn widths() -> [(&'static str, Option<Thin>); 0] {
     []
+}
+
+/// Whether this machine has AVX2, and the instructions on words that every machine with it has.
+#[cfg(all(target_arch = "x86_64", target_pointer_width = "64"))]
+#[inline]
+fn has_avx2() -> bool {
+    is_x86_feature_detected!("avx2")
+        && is_x86_feature_detected!("bmi1")
+        && is_x86_feature_detected!("bmi2")
+        && is_x86_feature_detected!("lzcnt")
+        && is_x86_feature_detected!("popcnt")
+}
+
+/// Does something in the widest lanes of this machine; all make the same bits.
+#[inline]
+pub(crate) fn widest<W: Work>(work: W) -> W::Output {
+    #[cfg(all(target_arch = "x86_64", target_pointer_width = "64"))]
+    if has_avx2() {
+        return numbers::avx2(work);
+    }
+    work.run::<f32x8>()
 }
 
 #[cfg(all(target_arch = "x86_64", target_pointer_width = "64"))]

@@ -1,8 +1,9 @@
 //! The lattice, and how its points, edges and tetrahedra are numbered.
 //!
 //! A body-centred cubic lattice has a point at each corner of its cubes (even) and one in each middle (odd).
-//! The points of [`SIDE`]^3 cubes are two words: bit (x * 4 + y) * 4 + z of one is cube (x, y, z)'s lowest
-//! corner, of the other its middle. So each question about a block is asked of 64 points at once.
+//! The points of [`SIDE`]^3 cubes are two words: a bit of one is a cube's lowest corner, of the other its middle.
+//! So each question about a block is asked of 64 points at once. A byte of a word is a leaf of 2^3 cubes; leaves and
+//! cubes stand in the order of [`Corner::ahead`].
 
 use nalgebra::{Point3, Vector3};
 
@@ -14,10 +15,6 @@ pub(super) const SIDE: i32 = 4;
 /// How far a lattice point may be moved, in cubes. A tetrahedron is half a cube wide at its narrowest, so
 /// below a quarter none can turn inside out.
 pub(super) const MAX_SHIFT: f64 = 0.24;
-
-/// The cubes of a block, and of all that is made of blocks, are taken this much lower than they lie: then
-/// all that stands on edges of a cube, whose ends may have been moved, is at or above its lowest corner.
-pub(super) const LOWERED: f64 = 0.25;
 
 /// The blocks along a side of the outermost cube: far less than a coordinate, in half cubes, can count.
 const MAX_BLOCKS_ALONG: i32 = 1 << 15;
@@ -55,11 +52,6 @@ impl Lattice {
     /// Where a lattice point is before any shift, mm.
     pub(super) fn position(&self, point: [i32; 3]) -> Point3<f64> {
         self.origin + Vector3::from(point).map(f64::from) * (self.cube / 2.0)
-    }
-
-    /// The middle of the cube of `cubes` lattice cubes a side at `corner`, [`LOWERED`], mm.
-    pub(super) fn middle(&self, corner: [i32; 3], cubes: i32) -> Point3<f64> {
-        self.position(corner) + Vector3::repeat((f64::from(cubes) / 2.0 - LOWERED) * self.cube)
     }
 
     /// Blocks along the side of the cube around the solid, a power of two; none if they are too many or
@@ -169,23 +161,42 @@ pub(super) const TETRAHEDRA: [Tetrahedron; 12] = {
     all
 };
 
+/// The place in its block, on each axis, of the cube with a bit.
+pub(super) const fn cube_of(bit: usize) -> [usize; 3] {
+    [bit >> 4 & 2 | bit >> 2 & 1, bit >> 3 & 2 | bit >> 1 & 1, bit >> 2 & 2 | bit & 1]
+}
+
+/// On each axis, the cubes whose next one is in the same leaf, in the next leaf, and in the next block.
+const NEXT: [[u64; 3]; 3] = {
+    let mut next = [[0; 3]; 3];
+    let mut i = 0;
+    while i < 3 * 64 {
+        let (axis, bit) = (i / 64, i % 64);
+        let along = cube_of(bit)[axis];
+        next[axis][if along.is_multiple_of(2) { 0 } else { 1 + along / 2 }] |= 1 << bit;
+        i += 1;
+    }
+    next
+};
+
 /// The points of a block and of the seven ahead of it, as the block's own cubes see them: element `ahead`
 /// has for each cube the bit of the cube ahead of it.
 pub(super) fn seen_ahead(blocks: [u64; 8]) -> [u64; 8] {
-    let on_z = |word: u64, next: u64| word >> 1 & 0x7777_7777_7777_7777 | next << 3 & 0x8888_8888_8888_8888;
-    let on_y = |word: u64, next: u64| word >> 4 & 0x0fff_0fff_0fff_0fff | next << 12 & 0xf000_f000_f000_f000;
-    let on_x = |word: u64, next: u64| word >> 16 | next << 48;
+    let on = |axis: usize, word: u64, next: u64| {
+        let ([same, leaf, block], step) = (NEXT[axis], 4 >> axis);
+        word >> step & same | word >> (7 * step) & leaf | next << (9 * step) & block
+    };
     let plane = |x: usize| {
         let [a, b, c, d] = [0, 1, 2, 3].map(|i| blocks[4 * x + i]);
-        [a, on_z(a, b), on_y(a, c), on_y(on_z(a, b), on_z(c, d))]
+        [a, on(2, a, b), on(1, a, c), on(1, on(2, a, b), on(2, c, d))]
     };
     let (here, next) = (plane(0), plane(1));
-    std::array::from_fn(|i| if i < 4 { here[i] } else { on_x(here[i - 4], next[i - 4]) })
+    std::array::from_fn(|i| if i < 4 { here[i] } else { on(0, here[i - 4], next[i - 4]) })
 }
 
 /// The lattice point of a cube, in half cubes.
 pub(super) fn point_of(block_corner: [i32; 3], bit: usize, kind: usize) -> [i32; 3] {
-    let cube = [bit >> 4, bit >> 2 & 3, bit & 3];
+    let cube = cube_of(bit);
     [0, 1, 2].map(|axis| block_corner[axis] + (2 * cube[axis] + kind) as i32)
 }
 
@@ -195,11 +206,10 @@ pub(super) mod tests {
 
     /// The block ahead, as in [`seen_ahead`], and the bit in it, of the cube that is `ahead` of the cube at `bit`.
     pub(in crate::stage::surface) fn cube_ahead(bit: usize, ahead: usize) -> (usize, usize) {
-        // The axes two bits apart of three: adding carries into the block's bit of its axis.
-        let spread = (bit & 0x30) << 2 | (bit & 0xc) << 1 | bit & 3;
-        let moved = spread + ((ahead & 4) << 4 | (ahead & 2) << 2 | ahead & 1);
-        let block = moved >> 6 & 4 | moved >> 4 & 2 | moved >> 2 & 1;
-        (block, moved >> 2 & 0x30 | moved >> 1 & 0xc | moved & 3)
+        let moved = [0, 1, 2].map(|axis| cube_of(bit)[axis] + (ahead >> (2 - axis) & 1));
+        let block = moved.iter().fold(0, |block, along| 2 * block + along / 4);
+        let there = (0..64).find(|&there| cube_of(there) == moved.map(|along| along % 4));
+        (block, there.expect("a cube of the block"))
     }
 
     /// A corner's place in half cubes, of the cube at the origin.

@@ -13,14 +13,15 @@ use rayon::prelude::*;
 use super::{
     CUBE, RoundCone, SurfaceError,
     block::{Grove, MAX_BLOCKS},
+    crossing::{PutVertices, Sorted},
     distance::Distance,
     lattice::{Lattice, SIDE},
-    near::{Numbers, Points},
-    patch::{Blocks, Cut, Place},
+    near::{FillNumbers, Numbers, Points},
+    patch::{Blocks, Count, Cut, Place, PutFaces},
     prune::{Answer, prune},
     region::{Level, Octant, Region, Solid},
 };
-use crate::mesh::Mesh;
+use crate::{mesh::Mesh, wide::widest};
 
 /// The solid is divided until there are so many regions, which are then worked on side by side.
 const GROVES: usize = 32;
@@ -107,7 +108,7 @@ impl Mesher {
             cuts.clear();
             cuts.extend((0..wood.groves[grove].blocks.len()).map(|place| {
                 let ahead = wood.ahead(grove, place);
-                Cut::of(&wood.blocks(&ahead), ahead)
+                widest(Count { blocks: &wood.blocks(&ahead), ahead })
             }));
         });
         let faces = number(cuts);
@@ -138,8 +139,7 @@ impl Seeds {
             let bundle = level.bundle(solid, *region);
             for octant in Octant::all(*region) {
                 let start = next.cones.len();
-                prune(&bundle, octant.around, answers, &mut next.cones);
-                if next.cones.len() > start {
+                if prune(&bundle, octant.around, answers, &mut next.cones) {
                     next.regions.push((octant.region, start..next.cones.len()));
                 }
             }
@@ -187,12 +187,13 @@ impl<'a> Wood<'a> {
         let count = |of: fn(&Cut) -> u32| cuts.iter().flatten().map(|cut| of(cut) as usize).sum();
         mesh.vertices.resize(count(|cut| cut.vertices), Point3::origin());
         spread(0, cuts, &mut mesh.vertices, |cut| cut.vertices, &|grove, mut vertices| {
-            let mut points = Points::new(solid.lattice);
+            let (mut points, mut sorted) = (Points::default(), Sorted::default());
             for cut in cuts[grove].iter().filter(|cut| cut.vertices > 0) {
                 let (own, others) = vertices.split_at_mut(cut.vertices as usize);
                 let blocks = self.blocks(&cut.ahead);
-                points.fill(solid, &blocks);
-                cut.put_vertices(solid, &blocks, &points, own);
+                points.fill(&blocks);
+                let (blocks, points, sorted) = (&blocks, &points, &mut sorted);
+                widest(PutVertices { cut, solid, blocks, points, sorted, vertices: own });
                 vertices = others;
             }
         });
@@ -202,8 +203,10 @@ impl<'a> Wood<'a> {
             let mut numbers = Numbers::default();
             for cut in cuts[grove].iter().filter(|cut| cut.faces > 0) {
                 let (own, others) = faces.split_at_mut(cut.faces as usize);
-                numbers.fill(&cut.ahead.map(|place| Some(&cuts[place?.0 as usize][place?.1 as usize])));
-                Cut::put_faces(&self.blocks(&cut.ahead), &numbers, vertices, own);
+                let ahead = cut.ahead.map(|place| Some(&cuts[place?.0 as usize][place?.1 as usize]));
+                widest(FillNumbers { cuts: &ahead, numbers: &mut numbers });
+                let blocks = self.blocks(&cut.ahead);
+                widest(PutFaces { blocks: &blocks, numbers: &numbers, vertices, faces: own });
                 faces = others;
             }
         });

@@ -5,24 +5,14 @@
 //! or a quadrilateral. Each edge and each tetrahedron belongs to one cube, and so to one block; its vertices
 //! are numbered by direction of the edge, and then by cube.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 
 use super::{
     block::{Block, Grove, bits},
     lattice::{Corner, EDGES, ENDS, Edge, TETRAHEDRA, Tetrahedron, seen_ahead},
-    near::{Numbers, PLACES, Points, Seen, block_of},
-    region::Solid,
+    near::{Numbers, PLACES},
 };
-
-/// A vertex is this close to the surface, in cubes: a hundredth of what a contour is wrong by.
-const EXACT: f32 = 1e-4;
-
-/// Steps after which the search for a vertex ends; it needs one or two where the surface is smooth.
-const MAX_STEPS: usize = 40;
-
-/// A vertex stays this share of its edge off the ends even where no point could be moved clear of the
-/// surface, as on a ball smaller than the way that they are moved.
-const END: f64 = 0.02;
+use crate::lanes::{Lanes, Work};
 
 /// For each set of corners inside (bit i is corner i) the corners in an order that keeps the orientation
 /// and begins with the fewer: those inside, or for three the one outside.
@@ -52,7 +42,7 @@ pub(super) type Place = (u32, u32);
 #[derive(Debug)]
 pub(super) struct Cut {
     /// The cubes of which the edge in each direction is cut.
-    edges: [u64; EDGES],
+    pub(super) edges: [u64; EDGES],
     /// The number of the first vertex in each direction, from the block's first.
     first: [u16; EDGES],
     /// The number of the block's first vertex.
@@ -68,6 +58,7 @@ pub(super) struct Cut {
 pub(super) type Blocks<'a> = [Option<(&'a Grove, &'a Block)>; 8];
 
 /// The points of a block that are inside, as its cubes see them: by kind, then by cube ahead.
+#[inline(always)]
 fn inside(blocks: &Blocks) -> [[u64; 8]; 2] {
     let own = blocks[0].expect("a block").1;
     // The middle of the last cube has an edge to each block ahead, which is not cut if that is missing.
@@ -80,10 +71,18 @@ fn inside(blocks: &Blocks) -> [[u64; 8]; 2] {
     [seen_ahead(inside[0]), seen_ahead(inside[1])]
 }
 
-impl Cut {
-    /// What of a block is cut; its first vertex is yet to be numbered.
-    pub(super) fn of(blocks: &Blocks, ahead: [Option<Place>; 8]) -> Self {
-        let inside = inside(blocks);
+/// What of a block is cut; its first vertex is yet to be numbered.
+pub(super) struct Count<'a> {
+    pub(super) blocks: &'a Blocks<'a>,
+    pub(super) ahead: [Option<Place>; 8],
+}
+
+impl Work for Count<'_> {
+    type Output = Cut;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Cut {
+        let inside = inside(self.blocks);
         let (mut edges, mut first, mut vertices) = ([0; EDGES], [0; EDGES], 0);
         for (direction, [a, b]) in ENDS.iter().enumerate() {
             edges[direction] = inside[a.kind][a.ahead] ^ inside[b.kind][b.ahead];
@@ -97,50 +96,38 @@ impl Cut {
                 faces += triangles.count_ones() + 2 * quadrilaterals.count_ones();
             }
         }
-        Self { edges, first, first_vertex: 0, vertices, faces, ahead }
+        Cut { edges, first, first_vertex: 0, vertices, faces, ahead: self.ahead }
     }
+}
 
+impl Cut {
     /// The edges in a direction that are cut, and the number of the first one's vertex.
     pub(super) fn numbered(&self, direction: usize) -> (u64, u32) {
         (self.edges[direction], self.first_vertex + u32::from(self.first[direction]))
     }
+}
 
-    /// Puts the block's vertices into `vertices`, mm; `points` are those that it sees.
-    pub(super) fn put_vertices(
-        &self,
-        solid: &Solid,
-        blocks: &Blocks,
-        points: &Points,
-        vertices: &mut [Point3<f64>],
-    ) {
-        let own = blocks[0].expect("a block").1;
-        let mut vertices = vertices.iter_mut();
-        for (&[first, second], &edges) in ENDS.iter().zip(&self.edges) {
-            let ends = [first, second].map(Points::offset);
-            for bit in bits(edges) {
-                let ends = if own.inside[first.kind] >> bit & 1 == 1 { ends } else { [ends[1], ends[0]] };
-                let [start, end] = ends.map(|end| points.at(PLACES[bit] + end));
-                let crossing = Crossing { solid, blocks, points, start, end };
-                *vertices.next().expect("a place for each vertex") = crossing.place();
-            }
-        }
-    }
+/// Puts a block's faces into `faces`; `numbers` are those of the vertices that it sees.
+pub(super) struct PutFaces<'a> {
+    pub(super) blocks: &'a Blocks<'a>,
+    pub(super) numbers: &'a Numbers,
+    pub(super) vertices: &'a [Point3<f64>],
+    pub(super) faces: &'a mut [[u32; 3]],
+}
 
-    /// Puts the block's faces into `faces`; `numbers` are those of the vertices that it sees.
-    pub(super) fn put_faces(
-        blocks: &Blocks,
-        numbers: &Numbers,
-        vertices: &[Point3<f64>],
-        faces: &mut [[u32; 3]],
-    ) {
-        let inside = inside(blocks);
-        let mut faces = faces.iter_mut();
+impl Work for PutFaces<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let inside = inside(self.blocks);
+        let mut faces = self.faces.iter_mut();
         let mut put = |face| *faces.next().expect("a place for each face") = face;
         for (tetrahedron, rings) in TETRAHEDRA.iter().zip(&RINGS) {
             let [a, b, c, d] = corners(tetrahedron, &inside);
             let ring = |bit: usize| {
                 let set = (a >> bit & 1) | (b >> bit & 1) << 1 | (c >> bit & 1) << 2 | (d >> bit & 1) << 3;
-                let vertex = |edge: u16| numbers.at(PLACES[bit] + usize::from(edge));
+                let vertex = |edge: u16| self.numbers.at(PLACES[bit] + usize::from(edge));
                 let [p, q, r, s] = rings[set as usize];
                 [vertex(p), vertex(q), vertex(r), vertex(s)]
             };
@@ -150,13 +137,16 @@ impl Cut {
                 put([p, q, r]);
             }
             for bit in bits(quadrilaterals) {
-                split(ring(bit), vertices).into_iter().for_each(&mut put);
+                let [p, q, r, s] = from_shorter_diagonal(ring(bit), self.vertices);
+                put([p, q, r]);
+                put([p, r, s]);
             }
         }
     }
 }
 
 /// Of each of a tetrahedron's corners, the cubes whose corner it is that are inside.
+#[inline(always)]
 fn corners(tetrahedron: &Tetrahedron, inside: &[[u64; 8]; 2]) -> [u64; 4] {
     let [a, b, c, d] = &tetrahedron.corners;
     let of = |corner: &Corner| inside[corner.kind][corner.ahead];
@@ -164,6 +154,7 @@ fn corners(tetrahedron: &Tetrahedron, inside: &[[u64; 8]; 2]) -> [u64; 4] {
 }
 
 /// The cubes of which a tetrahedron is cut in a triangle, and those of which in a quadrilateral.
+#[inline(always)]
 fn cut(tetrahedron: &Tetrahedron, inside: &[[u64; 8]; 2]) -> [u64; 2] {
     let [a, b, c, d] = corners(tetrahedron, inside);
     let triangles = a ^ b ^ c ^ d;
@@ -197,79 +188,11 @@ const RINGS: [[Ring; 16]; TETRAHEDRA.len()] = {
     rings
 };
 
-/// A quadrilateral split at its shorter diagonal.
-fn split([p, q, r, s]: [u32; 4], vertices: &[Point3<f64>]) -> [[u32; 3]; 2] {
+/// The corners of a quadrilateral, from one at which its shorter diagonal ends.
+#[inline(always)]
+fn from_shorter_diagonal([p, q, r, s]: [u32; 4], vertices: &[Point3<f64>]) -> [u32; 4] {
     let apart = |i: u32, j: u32| (vertices[i as usize] - vertices[j as usize]).norm_squared();
-    if apart(p, r) <= apart(q, s) { [[p, q, r], [p, r, s]] } else { [[p, q, s], [q, r, s]] }
-}
-
-/// An edge from a point inside to one outside.
-struct Crossing<'a> {
-    solid: &'a Solid<'a>,
-    blocks: &'a Blocks<'a>,
-    points: &'a Points,
-    start: Seen,
-    end: Seen,
-}
-
-impl Crossing<'_> {
-    /// Where the edge first leaves the solid.
-    ///
-    /// It leaves the cone that decides at its start; where it does, another may contain it.
-    #[inline(always)]
-    fn place(&self) -> Point3<f64> {
-        let from = self.points.corner + self.start.position;
-        let step = self.end.position - self.start.position;
-        let share = self.solid.distances[self.start.cone as usize].exit(&from, &step);
-        let Some(mut share) = share else { return from + step * END };
-        let leaf = self.leaf_of(&step, share);
-        if !self.is_alone(self.start.cone, leaf, step.norm_squared(), share) {
-            share = self.follow(leaf, share);
-        }
-        from + step * share.clamp(END, 1.0 - END)
-    }
-
-    /// From the share of the edge at which it leaves the cone that decides at its start to that at which it leaves the
-    /// solid: of what contains it there it is followed to the end, until nothing does.
-    #[inline(never)]
-    fn follow(&self, mut leaf: u32, mut share: f64) -> f64 {
-        let from = self.points.corner + self.start.position;
-        let step = self.end.position - self.start.position;
-        for _ in 0..MAX_STEPS {
-            let p = from + step * share;
-            let Some((grove, block)) = self.blocks[block_of(leaf)] else { break };
-            let (distance, cone) = grove.nearest(self.solid, block, &p);
-            if distance > -EXACT {
-                break;
-            }
-            let Some(exit) = self.solid.distances[cone as usize].exit(&from, &step) else { break };
-            share = exit;
-            leaf = self.leaf_of(&step, share);
-            if self.is_alone(cone, leaf, step.norm_squared(), share) {
-                break;
-            }
-        }
-        share
-    }
-
-    /// The leaf of a place at a share of the edge.
-    #[inline(always)]
-    fn leaf_of(&self, step: &Vector3<f64>, share: f64) -> u32 {
-        if self.start.leaf == self.end.leaf {
-            return self.start.leaf;
-        }
-        self.points.leaf_of(&(self.start.position + step * share))
-    }
-
-    /// Whether no other cone than `cone` contains the place in `leaf` at a share of the edge, the square of whose length
-    /// is `square`: as an end in that leaf knows of which it decides, and from which all others are further.
-    #[inline(always)]
-    fn is_alone(&self, cone: u32, leaf: u32, square: f64, share: f64) -> bool {
-        [(&self.start, share), (&self.end, 1.0 - share)].into_iter().any(|(end, share)| {
-            let others = f64::from(end.others) * self.solid.lattice.cube;
-            end.leaf == leaf && end.cone == cone && others > 0.0 && share * share * square < others * others
-        })
-    }
+    if apart(p, r) <= apart(q, s) { [p, q, r, s] } else { [q, r, s, p] }
 }
 
 #[cfg(test)]

@@ -14,9 +14,15 @@
 //!   another closely.
 
 use super::{
-    block::EDGE,
-    bundle::{Bundle, Group, ROUNDING, nearest_ball},
-    lanes::{LANES, Lanes, Vectors, all, dot, less, plus},
+    block::{EDGE, bits},
+    bundle::{Bundle, ROUNDING},
+    cone::Group,
+    region::Around,
+    vectors::{Vectors, all, dot, less, load, plus, store, times},
+};
+use crate::{
+    lanes::{LANES, Lanes, Work},
+    wide::widest,
 };
 
 /// Nearer than this to the centre of the ball that decides, rounding blurs the gradient; cubes.
@@ -25,17 +31,17 @@ const BLUR: f32 = 0.5;
 /// Longer cones are not compared by their ends, cubes.
 const SHORT: f32 = 8.0;
 
-/// What four cones answer about the middle of a region.
+/// What eight cones answer about the middle of a region.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Answer {
     /// Signed distance, cubes.
-    distance: Lanes,
+    distance: [f32; LANES],
     /// From the centre of the ball that decides, cubes.
-    from_centre: Lanes,
+    from_centre: [f32; LANES],
     /// How the distance grows: a unit vector.
-    gradient: Vectors,
+    gradient: [[f32; LANES]; 3],
     /// Positive where a rival has been found.
-    beaten: Lanes,
+    beaten: [f32; LANES],
 }
 
 /// The ball of a cone that decides the distance of the middle of the region.
@@ -47,152 +53,188 @@ struct Rival {
     radius: f32,
 }
 
-/// A region, as seen from the middle of a bundle.
-#[derive(Clone, Copy)]
-pub(super) struct Around {
-    /// Of its middle, cubes.
-    pub(super) offset: [f32; 3],
-    /// How far its corners are from its middle, cubes.
-    pub(super) reach: f32,
+/// Whether the surface passes within [`EDGE`] of a region. If so, appends to `kept` the cones of `bundle` that come
+/// within its margin and may be the nearest somewhere in it. `answers` is room to work in.
+pub(super) fn prune(bundle: &Bundle, around: Around, answers: &mut Vec<Answer>, kept: &mut Vec<u32>) -> bool {
+    widest(Prune { bundle, around, answers, kept })
 }
 
-/// Appends to `kept` the cones of `bundle` that come within [`EDGE`] of a region and may be the nearest somewhere in
-/// it; nothing if the surface passes nowhere so near. `answers` is room to work in.
-pub(super) fn prune(bundle: &Bundle, around: Around, answers: &mut Vec<Answer>, kept: &mut Vec<u32>) {
-    let offset = all(around.offset);
-    answers.clear();
-    answers.extend(bundle.groups.iter().map(|group| ask(group, offset)));
-    let first = place_of_least(answers, |answer| answer.distance);
-    let rival = rival(answers, first);
-    if rival.distance.abs() > around.reach + EDGE + ROUNDING * (rival.from_centre + around.reach) {
-        return;
-    }
-    let touching = Lanes::splat(around.reach + EDGE);
-    for answer in &mut *answers {
-        let apart = answer.distance - touching - answer.from_centre * Lanes::splat(ROUNDING);
-        answer.beaten = by_distance(answer, rival, around.reach).fast_max(apart);
-    }
-    if bundle.cones.len() > LANES {
-        let compare = |answers: &mut [Answer], rival: Rival| {
-            for (answer, group) in answers.iter_mut().zip(bundle.groups) {
-                answer.beaten = answer.beaten.fast_max(by_ball(group, rival, offset, around.reach));
-            }
-        };
-        let axis =
-            bundle.groups[first / LANES].axis.map(|axis| axis.to_array()[first % LANES] * around.reach);
-        if axis == [0.0; 3] {
-            compare(answers, rival);
-        } else {
-            // The balls that follow one another are most alike ahead of the middle and behind it.
-            for ahead in [axis, axis.map(|x| -x)] {
-                let way = all(ahead);
-                let place = place_of_least(answers, |answer| answer.ahead(way, around.reach));
-                let rival = self::rival(answers, place);
-                compare(answers, rival);
+/// See [`prune`].
+struct Prune<'a> {
+    bundle: &'a Bundle<'a>,
+    around: Around,
+    answers: &'a mut Vec<Answer>,
+    kept: &'a mut Vec<u32>,
+}
+
+impl Work for Prune<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> bool {
+        let Self { bundle, around: Around { offset, reach, margin }, answers, kept } = self;
+        if bundle.cones.is_empty() {
+            return false;
+        }
+        let offset = all::<L>(offset);
+        answers.clear();
+        for group in bundle.groups {
+            answers.push(ask(group, offset));
+        }
+        let mut least = Least::<L>::none();
+        for (i, answer) in answers.iter().enumerate() {
+            least.see(i, L::load(&answer.distance));
+        }
+        let first = least.place();
+        let rival = Rival::of(answers, first);
+        if rival.distance.abs() > reach + EDGE + ROUNDING * (rival.from_centre + reach) {
+            return false;
+        }
+        for answer in &mut **answers {
+            let rounding = L::load(&answer.from_centre) * L::splat(ROUNDING);
+            let apart = L::load(&answer.distance) - L::splat(reach + margin) - rounding;
+            answer.beaten = by_distance::<L>(answer, rival, reach).max(apart).store();
+        }
+        if bundle.cones.len() > LANES {
+            let axis = bundle.groups[first / LANES].axis.map(|axis| axis[first % LANES] * reach);
+            if axis == [0.0; 3] {
+                compare(bundle, answers, rival, offset, reach);
+            } else {
+                // The balls that follow one another are most alike ahead of the middle and behind it.
+                for ahead in [axis, axis.map(|x| -x)] {
+                    let way = all(ahead);
+                    let mut least = Least::<L>::none();
+                    for (i, answer) in answers.iter().enumerate() {
+                        least.see(i, answer.ahead(way, reach));
+                    }
+                    let rival = Rival::of(answers, least.place());
+                    compare(bundle, answers, rival, offset, reach);
+                }
             }
         }
-    }
-    for (cones, answer) in bundle.cones.chunks(LANES).zip(&*answers) {
-        let beaten = Lanes::ZERO.simd_lt(answer.beaten).to_bitmask();
-        kept.extend(cones.iter().enumerate().filter(|&(i, _)| beaten >> i & 1 == 0).map(|(_, &cone)| cone));
+        for (cones, answer) in bundle.cones.chunks(LANES).zip(&**answers) {
+            let beaten = L::splat(0.0).is_below(L::load(&answer.beaten)).bits();
+            let all = u32::MAX >> (u32::BITS as usize - cones.len());
+            kept.extend(bits(u64::from(!beaten & all)).map(|i| cones[i]));
+        }
+        true
     }
 }
 
 /// What the cones of a group answer about a point.
 #[inline(always)]
-fn ask(group: &Group, offset: Vectors) -> Answer {
-    let p = plus(group.middle, offset);
-    let along = dot(p, group.axis);
-    let away = (dot(p, p) - along * along).fast_max(Lanes::ZERO);
-    let (_, s) = nearest_ball(along, away, [group.low, group.high, group.lean]);
-    let from_centre = less(p, group.axis, s);
-    let far = dot(from_centre, from_centre).sqrt();
-    let scale = Lanes::ONE / far.fast_max(Lanes::splat(f32::MIN_POSITIVE));
+fn ask<L: Lanes>(group: &Group, offset: Vectors<L>) -> Answer {
+    let (from_centre, square, radius) = group.balls(offset);
+    let far = square.sqrt();
+    let scale = L::splat(1.0) / far.max(L::splat(f32::MIN_POSITIVE));
     Answer {
-        distance: far - (group.radius + group.slope * s),
-        from_centre: far,
-        gradient: [from_centre[0] * scale, from_centre[1] * scale, from_centre[2] * scale],
-        beaten: Lanes::ZERO,
+        distance: (far - radius).store(),
+        from_centre: far.store(),
+        gradient: store(times(from_centre, scale)),
+        beaten: [0.0; LANES],
     }
 }
 
-/// The place of the cone of which `value` is the least.
-fn place_of_least(answers: &[Answer], value: impl Fn(&Answer) -> Lanes) -> usize {
-    let mut least = Lanes::splat(f32::INFINITY);
-    // As numbers, which are exact for all that there is memory for.
-    let mut groups = Lanes::ZERO;
-    for (group, answer) in answers.iter().enumerate() {
-        let value = value(answer);
-        groups = value.simd_lt(least).bitselect(Lanes::splat(group as f32), groups);
-        least = value.fast_min(least);
-    }
-    let least = least.to_array();
-    let lane = (1..LANES).fold(0, |best, i| if least[i] < least[best] { i } else { best });
-    groups.to_array()[lane] as usize * LANES + lane
+/// The cone of which a value is the least.
+struct Least<L> {
+    least: L,
+    /// As numbers, which are exact for all that there is memory for.
+    groups: L,
 }
 
-fn rival(answers: &[Answer], place: usize) -> Rival {
-    let (answer, lane) = (&answers[place / LANES], place % LANES);
-    let (distance, from_centre) = (answer.distance.to_array()[lane], answer.from_centre.to_array()[lane]);
-    let gradient = answer.gradient.map(|axis| axis.to_array()[lane]);
-    Rival { distance, from_centre, gradient, radius: from_centre - distance }
+impl<L: Lanes> Least<L> {
+    #[inline(always)]
+    fn none() -> Self {
+        Self { least: L::splat(f32::INFINITY), groups: L::splat(0.0) }
+    }
+
+    /// The values of a group's cones.
+    #[inline(always)]
+    fn see(&mut self, group: usize, value: L) {
+        self.groups = value.is_below(self.least).choose(L::splat(group as f32), self.groups);
+        self.least = value.min(self.least);
+    }
+
+    /// Its place.
+    #[inline(always)]
+    fn place(&self) -> usize {
+        let least = self.least.store();
+        let lane = (1..LANES).fold(0, |best, i| if least[i] < least[best] { i } else { best });
+        self.groups.store()[lane] as usize * LANES + lane
+    }
+}
+
+impl Rival {
+    fn of(answers: &[Answer], place: usize) -> Self {
+        let (answer, lane) = (&answers[place / LANES], place % LANES);
+        let (distance, from_centre) = (answer.distance[lane], answer.from_centre[lane]);
+        let gradient = answer.gradient.map(|axis| axis[lane]);
+        Self { distance, from_centre, gradient, radius: from_centre - distance }
+    }
 }
 
 impl Answer {
     /// About the distances of a point that is `way` from the middle, `reach` in length.
     #[inline(always)]
-    fn ahead(&self, way: Vectors, reach: f32) -> Lanes {
-        let uphill = dot(self.gradient, way);
-        let across = Lanes::splat(reach * reach) - uphill * uphill;
-        self.distance + uphill + across / (self.from_centre + self.from_centre + Lanes::splat(reach))
+    fn ahead<L: Lanes>(&self, way: Vectors<L>, reach: f32) -> L {
+        let uphill = dot(load(&self.gradient), way);
+        let across = L::splat(reach * reach) - uphill * uphill;
+        let from_centre = L::load(&self.from_centre);
+        L::load(&self.distance) + uphill + across / (from_centre + from_centre + L::splat(reach))
     }
 }
 
 /// Compares by the way, and by tangents: positive where the rival is nearer everywhere.
 #[inline(always)]
-fn by_distance(answer: &Answer, rival: Rival, reach: f32) -> Lanes {
-    let gradient = all(rival.gradient);
-    let turned = less(answer.gradient, gradient, Lanes::splat(1.0));
-    let tangent = dot(turned, turned).sqrt() * Lanes::splat(reach)
-        + Lanes::splat(reach * reach / (2.0 * rival.from_centre));
-    let rounding = (answer.from_centre + Lanes::splat(rival.from_centre + reach)) * Lanes::splat(ROUNDING);
-    let further = answer.distance - Lanes::splat(rival.distance) - rounding;
+fn by_distance<L: Lanes>(answer: &Answer, rival: Rival, reach: f32) -> L {
+    let from_centre = L::load(&answer.from_centre);
+    let turned = less(load(&answer.gradient), all(rival.gradient), L::splat(1.0));
+    let tangent =
+        dot(turned, turned).sqrt() * L::splat(reach) + L::splat(reach * reach / (2.0 * rival.from_centre));
+    let rounding = (from_centre + L::splat(rival.from_centre + reach)) * L::splat(ROUNDING);
+    let further = L::load(&answer.distance) - L::splat(rival.distance) - rounding;
     // Blurred gradients count as opposite ones.
-    let blurred =
-        answer.from_centre.simd_lt(Lanes::splat(BLUR)).bitselect(Lanes::splat(f32::INFINITY), Lanes::ZERO);
-    further - (tangent + blurred).fast_min(Lanes::splat(2.0 * reach))
+    let opposite = L::splat(2.0 * reach);
+    further - from_centre.is_below(L::splat(BLUR)).choose(opposite, tangent.min(opposite))
+}
+
+/// Compares all cones with a rival by the squares of distances to centres.
+#[inline(always)]
+fn compare<L: Lanes>(bundle: &Bundle, answers: &mut [Answer], rival: Rival, offset: Vectors<L>, reach: f32) {
+    for (answer, group) in answers.iter_mut().zip(bundle.groups) {
+        answer.beaten = L::load(&answer.beaten).max(by_ball(group, rival, offset, reach)).store();
+    }
 }
 
 /// Compares the balls of one end of each cone by the squares of distances to centres.
 #[inline(always)]
-fn end_by_ball(group: &Group, end: Lanes, rival: Rival, offset: Vectors, reach: f32) -> Lanes {
-    let gradient = all(rival.gradient);
-    let far = Lanes::splat(rival.from_centre);
+fn end_by_ball<L: Lanes>(group: &Group, end: L, rival: Rival, offset: Vectors<L>, reach: f32) -> L {
+    let far = L::splat(rival.from_centre);
     let square = far * far;
     // Never infinite, as nothing times that is no number; and still more than any way across the region.
-    let bend = Lanes::splat(reach * reach / rival.from_centre.max(1e-6));
-    let p = less(plus(group.middle, offset), group.axis, end);
+    let bend = L::splat(reach * reach / rival.from_centre.max(1e-6));
+    let p = less(plus(load(&group.middle), offset), load(&group.axis), end);
     let own = dot(p, p);
-    let larger = group.radius + group.slope * end - Lanes::splat(rival.radius);
-    let turned = less(p, gradient, far + larger);
-    let rounding = (own + square + larger * larger + Lanes::splat(reach * reach)) * Lanes::splat(ROUNDING);
+    let larger = L::load(&group.radius) + L::load(&group.slope) * end - L::splat(rival.radius);
+    let turned = less(p, all(rival.gradient), far + larger);
+    let rounding = (own + square + larger * larger + L::splat(reach * reach)) * L::splat(ROUNDING);
     own - square
         - larger * (far + far + larger)
-        - dot(turned, turned).sqrt() * Lanes::splat(2.0 * reach)
-        - larger.fast_max(Lanes::ZERO) * bend
+        - dot(turned, turned).sqrt() * L::splat(2.0 * reach)
+        - larger.max(L::splat(0.0)) * bend
         - rounding
 }
 
 /// Compares by the squares of distances to centres: positive where the rival is nearer everywhere.
 #[inline(always)]
-fn by_ball(group: &Group, rival: Rival, offset: Vectors, reach: f32) -> Lanes {
-    let low = end_by_ball(group, group.low, rival, offset, reach);
-    let length = group.high - group.low;
-    if !Lanes::ZERO.simd_lt(length).any() {
+fn by_ball<L: Lanes>(group: &Group, rival: Rival, offset: Vectors<L>, reach: f32) -> L {
+    let low = end_by_ball(group, L::load(&group.low), rival, offset, reach);
+    if group.are_balls {
         return low;
     }
-    let high = end_by_ball(group, group.high, rival, offset, reach);
-    let ends = low.fast_min(high) - length * length * Lanes::splat(0.25);
+    let length = L::load(&group.high) - L::load(&group.low);
+    let high = end_by_ball(group, L::load(&group.high), rival, offset, reach);
+    let ends = low.min(high) - length * length * L::splat(0.25);
     // A long cone is not its ends.
-    length.simd_lt(Lanes::splat(SHORT)).bitselect(ends, Lanes::splat(-1.0))
+    length.is_below(L::splat(SHORT)).choose(ends, L::splat(-1.0))
 }

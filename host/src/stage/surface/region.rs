@@ -3,10 +3,11 @@
 use nalgebra::Point3;
 
 use super::{
-    bundle::{Bundle, Group, prepare},
+    block::EDGE,
+    bundle::Bundle,
+    cone::{Group, prepare},
     distance::Distance,
-    lattice::Lattice,
-    prune::Around,
+    lattice::{Lattice, MAX_SHIFT, SIDE},
 };
 
 /// What all regions have in common.
@@ -33,9 +34,10 @@ impl Region {
     }
 }
 
-/// How far the corners of a region of `cubes` a side are from its middle, in cubes.
-fn reach(cubes: i32) -> f32 {
-    cubes as f32 * 0.866_025_5
+/// How far all that belongs to a region of `cubes` a side is from its middle, in cubes: its points, wherever they are
+/// moved to, and the edges of its cubes.
+pub(super) const fn reach(cubes: i32) -> f32 {
+    0.5 * cubes as f32 * 1.732_051 + MAX_SHIFT as f32
 }
 
 /// A region on the way down.
@@ -47,7 +49,7 @@ pub(super) struct Level {
 
 impl Solid<'_> {
     pub(super) fn middle(&self, region: Region) -> Point3<f64> {
-        self.lattice.middle(region.corner, region.cubes)
+        self.lattice.position(region.corner.map(|along| along + region.cubes))
     }
 }
 
@@ -59,6 +61,18 @@ impl Level {
         prepare(&self.cones, solid.distances, &middle, solid.lattice.cube, &mut self.groups);
         Bundle { cones: &self.cones, groups: &self.groups, middle }
     }
+}
+
+/// A region, as seen from the middle of a bundle.
+#[derive(Clone, Copy)]
+pub(super) struct Around {
+    /// Of its middle, cubes.
+    pub(super) offset: [f32; 3],
+    /// How far all that belongs to it is from its middle, cubes.
+    pub(super) reach: f32,
+    /// How near to it cones are kept, cubes: of a block those that touch it, and above those that tell which blocks
+    /// there are.
+    pub(super) margin: f32,
 }
 
 /// One of the eight children of a region.
@@ -76,8 +90,9 @@ impl Octant {
 
     pub(super) fn of(parent: Region, octant: usize) -> Self {
         let region = parent.octant(octant);
+        let margin = if region.cubes == SIDE { 0.0 } else { EDGE };
         let quarter = parent.cubes as f32 / 4.0;
         let offset = [0, 1, 2].map(|axis| if octant >> (2 - axis) & 1 == 1 { quarter } else { -quarter });
-        Self { region, around: Around { offset, reach: reach(region.cubes) } }
+        Self { region, around: Around { offset, reach: reach(region.cubes), margin } }
     }
 }
