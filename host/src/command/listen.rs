@@ -125,7 +125,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let end = args.seconds.map(|seconds| Instant::now() + Duration::from_secs(seconds.into()));
     let stop = interruption()?;
     let mut session = begin(args, &model, &mut desk)?;
-    let mut orders = Orders::new(args, asked);
+    let mut orders = Orders::new(args, asked, &options);
     let heard = listen(args, (&mut session, &mut orders), &mut desk, || {
         stop.load(Ordering::Relaxed) || end.is_some_and(|end| Instant::now() >= end)
     });
@@ -173,6 +173,7 @@ fn listen(
                     desk.greeted(hello)?;
                     started = false;
                 }
+                orders.note(&message);
                 let lost = session.tally().frames.missing;
                 desk.take(session.inbox(), message, lost)?;
             }
