@@ -13,6 +13,9 @@
 //! then told; it begins with otsu and bright unless the flags say otherwise. Models are written only if --out is given.
 //! docs/live.md tells more.
 //!
+//! With --front grey or auto the device sends the pictures of each pair as well, 150 KB, in which the visible side is
+//! measured; a pair whose pictures did not come is made of balls, with a warning.
+//!
 //! --record keeps what came, byte for byte; `host replay FILE` makes the same models of it again.
 //!
 //! With --json, every pair is a line of JSON when it is done, and the last line is about the link.

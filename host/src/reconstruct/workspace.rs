@@ -7,7 +7,7 @@ use crate::calibration::StereoCamera;
 use crate::memory::Storage;
 use crate::mesh::Mesh;
 use crate::mesh::body::Bodies;
-use crate::stage::front::{self, Sight};
+use crate::stage::front::{self, Pool, Sight};
 use crate::stage::rectify::{PixelBox, Rectification, RectifiedCamera, RectifyError, device_images};
 use crate::stage::surface::{Mesher, RoundCone};
 use image::GrayImage;
@@ -40,6 +40,8 @@ pub struct Workspace {
     mesher: Mesher,
     bodies: Bodies,
     mesh: Mesh,
+    /// Of the visible side.
+    pool: Pool,
     /// Of the skeleton.
     radii: Vec<f64>,
     clock: Clock,
@@ -173,6 +175,9 @@ impl Workspace {
     /// Give back the lists of what was made and is done with, for the next pair.
     pub fn recycle(&mut self, made: Reconstruction) {
         self.mesh = made.mesh;
+        if let Some(front) = made.front {
+            self.pool.recycle(front.confidence);
+        }
         self.growth.skeleton = made.skeleton;
         self.growth.boundary = made.boundary;
         self.clock.laps = made.times;
@@ -200,7 +205,8 @@ impl Workspace {
                 let masks = self.storage.masks().map_err(Finding::from)?;
                 let rows = f64::from(outcome.vertical_offset) / 256.0;
                 let sight = Sight { images, masks, camera: &camera, rows };
-                let measured = front::measure(&mut self.mesh, &sight, options.front == Front::Auto);
+                let measured =
+                    front::measure(&self.pool, &mut self.mesh, &sight, options.front == Front::Auto);
                 self.clock.lap("front");
                 Some(measured)
             }
