@@ -4,7 +4,6 @@
 
 use host::calibration::StereoCamera;
 use host::export;
-use host::geometry::Geometry;
 use host::reconstruct::{Options, reconstruct};
 use host::source::picture::load_view;
 use std::error::Error;
@@ -20,5 +19,5 @@ fn main() -> Result<(), Box<dyn Error>> {
     // Nobody looks on: `()`. A `report::record::Record` in its place keeps what every stage made.
     let model = reconstruct(left, right, &camera, &Options::default(), &mut ())?;
     println!("{} faces, {:.1} cm3", model.mesh.faces.len(), model.mesh.volume() / 1000.0);
-    Ok(export::write(Path::new(output), &Geometry::Mesh(model.mesh))?)
+    Ok(export::write(Path::new(output), &model.mesh.into())?)
 }

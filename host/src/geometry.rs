@@ -7,7 +7,18 @@ use crate::mesh::Mesh;
 #[derive(Clone, Debug, PartialEq)]
 pub enum Geometry {
     /// Triangles.
-    Mesh(Mesh),
+    Mesh {
+        /// Themselves.
+        mesh: Mesh,
+        /// How well each vertex is known, 0 to 1; empty where nobody says.
+        confidence: Vec<f64>,
+    },
     /// Points, with edges and radii where there are any.
     Curves(Curves),
+}
+
+impl From<Mesh> for Geometry {
+    fn from(mesh: Mesh) -> Self {
+        Self::Mesh { mesh, confidence: Vec::new() }
+    }
 }

@@ -7,7 +7,6 @@
 //!
 //! ```no_run
 //! use host::calibration::StereoCamera;
-//! use host::geometry::Geometry;
 //! use host::reconstruct::{Options, reconstruct};
 //! use host::source::picture::load_view;
 //! use std::path::Path;
@@ -15,7 +14,7 @@
 //! let [left, right] = ["left.png", "right.png"].map(|name| load_view(Path::new(name)));
 //! let camera = StereoCamera::read("calib.yaml")?;
 //! let model = reconstruct(left?.image, right?.image, &camera, &Options::default(), &mut ())?;
-//! host::export::write(Path::new("model.stl"), &Geometry::Mesh(model.mesh))?;
+//! host::export::write(Path::new("model.stl"), &model.mesh.into())?;
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!

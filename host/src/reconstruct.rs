@@ -16,7 +16,7 @@ mod workspace;
 pub use device::{describe, optics};
 pub(crate) use options::settings;
 pub use options::{Front, Mode, Options, Pieces, Profile, Radius, Skeleton};
-pub use workspace::Workspace;
+pub use workspace::{Seen, Workspace};
 
 use crate::calibration::StereoCamera;
 use crate::curves::Curves;
@@ -116,7 +116,7 @@ pub fn reconstruct_shape(
     options: &Options,
     observer: &mut impl Observer,
 ) -> Result<Reconstruction, Refusal> {
-    Workspace::default().reconstruct_shape((memory, outcome), model, options, observer)
+    Workspace::default().reconstruct_shape((memory, outcome), None, model, options, observer)
 }
 
 /// Times of consecutive stages.

@@ -2,7 +2,7 @@
 
 use allocation_counter::measure;
 use host::calibration::{Distortion, StereoCamera};
-use host::reconstruct::{Mode, Options, Profile, Radius, Skeleton, Workspace};
+use host::reconstruct::{Front, Mode, Options, Profile, Radius, Skeleton, Workspace};
 use host::render::render;
 use host::shape::Shape;
 use host::view::Calibrated;
@@ -33,6 +33,8 @@ fn a_warm_workspace_allocates_nothing() {
         ("nurbs", straight(), Options { skeleton: Skeleton::Nurbs, ..default }),
         ("boundary", straight(), Options { radius: Radius::Boundary, ..default }),
         ("device", straight(), Options { profile: Profile::Device, ..default }),
+        ("front", turned(), Options { front: Front::Grey, ..default }),
+        ("gated front", straight(), Options { front: Front::Auto, ..default }),
         ("paper", straight(), Options { mode: Mode::Paper { omega: 3 }, ..default }),
     ];
     // Allocations are counted on the thread that measures, so that one has to do all the work.

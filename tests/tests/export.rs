@@ -85,6 +85,28 @@ fn a_mesh_is_the_same_in_every_format() {
 }
 
 #[test]
+fn confidence_goes_along_where_the_format_has_a_place_for_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let [source, copy, glb, stl] =
+        ["known.ply", "copy.ply", "out.glb", "out.stl"].map(|name| within(folder.path(), name));
+    let known: Vec<f64> = (0..shape().vertices.len()).map(|i| f64::from((i % 9) as u8) / 8.0).collect();
+    let scalars = [("confidence", &known[..])];
+    host::export::ply::write_known_mesh(Path::new(&source), &shape(), &scalars, &[]).unwrap();
+    for output in [&copy, &glb, &stl] {
+        host(&["convert", &source, output]).unwrap();
+    }
+    let Geometry::Mesh { mesh, confidence } = read_geometry(Path::new(&copy)).unwrap() else { panic!() };
+    assert_eq!((mesh.vertices.len(), confidence), (known.len(), known.clone()));
+
+    let (document, buffers, _) = gltf::import(&glb).unwrap();
+    let primitive = document.meshes().next().unwrap().primitives().next().unwrap();
+    let accessor = primitive.get(&gltf::Semantic::Extras("CONFIDENCE".into())).unwrap();
+    let data = |buffer: gltf::Buffer<'_>| Some(&buffers[buffer.index()][..]);
+    let found: Vec<f32> = gltf::accessor::Iter::new(accessor, data).unwrap().collect();
+    assert!(found.iter().map(|value| f64::from(*value)).eq(known));
+}
+
+#[test]
 fn a_skeleton_is_the_same_in_every_format() {
     let folder = tempfile::tempdir().unwrap();
     let source = within(folder.path(), "skeleton.ply");

@@ -8,6 +8,7 @@ use host::shape::Shape;
 use host::view::Pinhole;
 use nalgebra::{Point3, Vector3};
 use oracle::cases::{cases, folder, name, open};
+use oracle::confidence::{ratios, vertices};
 use oracle::looks::Look;
 use oracle::mesh_checker::check;
 use oracle::scene::{Pair, model};
@@ -163,8 +164,9 @@ fn the_visible_side_of_the_cases_is_nearer_to_the_truth() {
         let ([left, right], camera) = open(case);
         let truth = host::mesh::read::read(&case.join("truth.ply")).unwrap();
         let ruler = Ruler { samples: 5000, grid: 2, sections: 1, seed: 0 };
-        let errors = [Front::Balls, Front::Grey, Front::Auto].map(|front| {
-            let made = reconstruct(left.clone(), right.clone(), &camera, &with(front), &mut ()).unwrap();
+        let made = [Front::Balls, Front::Grey, Front::Auto]
+            .map(|front| reconstruct(left.clone(), right.clone(), &camera, &with(front), &mut ()).unwrap());
+        let errors = made.each_ref().map(|made| {
             let measured = evaluate::<Pinhole>(&made.mesh, &truth, &[], &ruler);
             assert!(measured.closed && measured.bodies == 1, "{}", name(case));
             measured.distance.unwrap().symmetric.mean_pct
@@ -180,4 +182,28 @@ fn the_visible_side_of_the_cases_is_nearer_to_the_truth() {
     }
     println!("means {sums:.3?} %");
     assert!(sums[1] <= sums[0] - 0.14, "{sums:.3?}");
+}
+
+/// Below this error, % of the diagonal, what is left is noise, everywhere alike.
+const NOISE: f64 = 0.2;
+
+#[test]
+fn confidence_says_how_far_the_vertices_of_the_cases_are_off() {
+    let Some(folder) = folder() else { return };
+    let mut together = Vec::new();
+    for case in cases(&folder) {
+        let ([left, right], camera) = open(&case);
+        let truth = host::mesh::read::read(&case.join("truth.ply")).unwrap();
+        let made = reconstruct(left, right, &camera, &with(Front::Auto), &mut ()).unwrap();
+        if error(&made.mesh, &truth) < NOISE {
+            continue;
+        }
+        let vertices = vertices(&made, &truth);
+        let told = ratios(&vertices);
+        println!("{:12} {told:.2?}", name(&case));
+        together.extend(vertices);
+    }
+    let told = ratios(&together);
+    println!("together     {told:.2?}");
+    assert!(told.iter().all(|ratio| *ratio >= 3.0), "{told:?}");
 }

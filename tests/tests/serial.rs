@@ -46,6 +46,14 @@ fn intact(_: usize, bytes: Vec<u8>) -> Vec<u8> {
     bytes
 }
 
+/// A line on which a frame takes some time, as half of one does on a board's.
+fn slow(_: usize, bytes: Vec<u8>) -> Vec<u8> {
+    if !bytes.is_empty() {
+        thread::sleep(Duration::from_millis(20));
+    }
+    bytes
+}
+
 /// Carry bytes between a device and a port until the port or `limit` bytes end.
 fn carry(bench: &mut Bench<Eyes>, port: &mut Port, fault: Fault, limit: usize) {
     let (mut sent, mut buffer) = (0, [0; 512]);
@@ -167,6 +175,36 @@ fn live_recorded_and_from_pictures_are_the_same_model() {
     camera(2).write_opencv_yaml(&other).unwrap();
     let refused = host(&["listen", "--port", port, "--calib", &other, "--out", &live]).unwrap_err();
     assert!(refused.contains("another calibration"), "{refused}");
+}
+
+#[test]
+fn the_visible_side_of_a_devices_pair_is_measured_in_the_pictures_beside_it() {
+    let (folder, pictures) = scene();
+    let folder = folder.path();
+    let file = |name: &str| within(folder, name);
+    let port = &serve(folder, &pictures, slow, usize::MAX);
+    prepare(folder, port);
+    let (calib, live, tape) = (file("calib.yaml"), file("live"), file("tape"));
+    let front = ["--front", "auto"];
+    let listen =
+        ["listen", "--port", port, "--calib", &calib, "--frames", "6", "--out", &live, "--record", &tape];
+    host(&[&listen[..], &front].concat()).unwrap();
+    host(&[&["replay", &tape, "--out", &file("again")], &front[..]].concat()).unwrap();
+    let balls = direct(folder);
+    let (left, right, out) = (file("left.png"), file("right.png"), file("seen"));
+    host(&[&["replay", &left, &right, "--calib", &calib, "--as-device", "--out", &out], &front[..]].concat())
+        .unwrap();
+    let truth = model(&folder.join("seen"));
+    assert!(truth != balls, "the visible side moves");
+    let measured = (1..=6).filter(|pair| {
+        let [live, again] =
+            ["live", "again"].map(|place| model(&folder.join(place).join(format!("{pair:06}"))));
+        assert!(live == again, "pair {pair}");
+        // The device may have begun a pair before it was asked for pictures.
+        assert!(live == truth || live == balls, "pair {pair}");
+        live == truth
+    });
+    assert!(measured.count() > 0);
 }
 
 /// Bits flip, 300 bytes vanish, a connection begins within a frame and then says nothing of use for long.

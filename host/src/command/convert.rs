@@ -11,7 +11,8 @@
 //!   .swc   skeletons with radii, mm: for those who study trees and neurons
 //!   .json  the skeleton's branches as NURBS with radii, mm: for those who calculate with them
 //!
-//! Nothing is scaled or moved, but that .glb is turned and in metres as its readers expect.
+//! Nothing is scaled or moved, but that .glb is turned and in metres as its readers expect. The confidence of each vertex
+//! that --front leaves goes into .ply and .glb; that other formats leave it out is said.
 //!
 //! Examples:
 //!   host convert ossature-demo/torus torus.glb
@@ -53,6 +54,7 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let input = if args.input.is_dir() { result(&args.input, &args.output) } else { args.input.clone() };
     sweep(folder_of(&args.output));
+    let mut left_out = None;
     let (kind, (points, number), (elements, many)) = if export::has_extension(&input, "json") {
         let curves = splines(&input)?;
         export::write_splines(&args.output, &curves)?;
@@ -62,23 +64,34 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let geometry = read_geometry(&input)?;
         export::write(&args.output, &geometry)?;
         match &geometry {
-            Geometry::Mesh(mesh) => ("mesh", ("vertices", mesh.vertices.len()), ("faces", mesh.faces.len())),
+            Geometry::Mesh { mesh, confidence } => {
+                left_out = Some("confidence")
+                    .filter(|_| !confidence.is_empty() && !export::holds_confidence(&args.output));
+                ("mesh", ("vertices", mesh.vertices.len()), ("faces", mesh.faces.len()))
+            }
             Geometry::Curves(curves) => {
                 ("curves", ("vertices", curves.points.len()), ("edges", curves.edges.len()))
             }
         }
     };
     if args.json {
-        return say_json(&json!({
+        let mut told = json!({
             "input": input.display().to_string(),
             "output": args.output.display().to_string(),
             "kind": kind,
             points: number,
             elements: many,
-        }));
+        });
+        if let Some(what) = left_out {
+            told["left_out"] = json!(what);
+        }
+        return say_json(&told);
     }
     let mut table = Table::new(&args.output.display().to_string());
     table.row(kind, &format!("{}, {}", counted(number, points), counted(many, elements)));
+    if let Some(what) = left_out {
+        table.row("left out", &format!("the {what} of each vertex, which .ply and .glb hold"));
+    }
     table.row("from", &input.display().to_string());
     say(table.text())
 }

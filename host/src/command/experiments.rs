@@ -19,6 +19,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::table::Table;
 use super::{Failure, say, say_json};
 use crate::experiment::{self, Effort, Experiments, Way};
+use crate::reconstruct::Front;
 
 /// Arguments of `experiments`.
 #[derive(Debug, clap::Args)]
@@ -29,6 +30,16 @@ pub struct Args {
     /// Two shapes, coarser meshes, fewer samples
     #[arg(long)]
     quick: bool,
+    /// The visible side of the default's models: from balls, from the grey levels of both images, or from these
+    /// where they are to be trusted
+    #[arg(
+        long,
+        value_enum,
+        hide_possible_values = true,
+        default_value = "balls",
+        value_name = "balls|grey|auto"
+    )]
+    front: Front,
     /// Print one JSON document instead of text
     #[arg(long)]
     pub(super) json: bool,
@@ -42,6 +53,7 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let start = Instant::now();
     let effort = if args.quick { Effort::quick() } else { Effort::full() };
+    let effort = Effort { front: args.front, ..effort };
     let bar = if std::io::stderr().is_terminal() {
         ProgressBar::new(effort.steps() as u64)
     } else {

@@ -13,6 +13,9 @@
 //! then told; it begins with otsu and bright unless the flags say otherwise. Models are written only if --out is given.
 //! docs/live.md tells more.
 //!
+//! With --front grey or auto the device sends the pictures of each pair as well, 150 KB, in which the visible side is
+//! measured; a pair whose pictures did not come is made of balls, with a warning.
+//!
 //! --record keeps what came, byte for byte; `host replay FILE` makes the same models of it again.
 //!
 //! With --json, every pair is a line of JSON when it is done, and the last line is about the link.
@@ -125,7 +128,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let end = args.seconds.map(|seconds| Instant::now() + Duration::from_secs(seconds.into()));
     let stop = interruption()?;
     let mut session = begin(args, &model, &mut desk)?;
-    let mut orders = Orders::new(args, asked);
+    let mut orders = Orders::new(args, asked, &options);
     let heard = listen(args, (&mut session, &mut orders), &mut desk, || {
         stop.load(Ordering::Relaxed) || end.is_some_and(|end| Instant::now() >= end)
     });
@@ -173,6 +176,7 @@ fn listen(
                     desk.greeted(hello)?;
                     started = false;
                 }
+                orders.note(&message);
                 let lost = session.tally().frames.missing;
                 desk.take(session.inbox(), message, lost)?;
             }

@@ -15,7 +15,7 @@ use super::{Failure, words_of};
 use crate::calibration::StereoCamera;
 use crate::mesh::Mesh;
 use crate::output;
-use crate::reconstruct::{Options, Reconstruction, Refusal, Workspace, describe};
+use crate::reconstruct::{Front, Options, Reconstruction, Refusal, Seen, Workspace, describe};
 use crate::report::record::Record;
 use crate::report::times::{self, Stage};
 use crate::report::{Refused, Run, numbers, words};
@@ -155,6 +155,7 @@ pub(super) fn make_as_device(
     workspace: &mut Workspace,
 ) -> Result<Model, Failure> {
     let start = Instant::now();
+    let pictures = (options.front != Front::Balls).then(|| [left.clone(), right.clone()]);
     let described = describe(left, right, calibration, options);
     let (device, bytes) =
         described.map_err(|refusal| place.refused(options, &Record::figures_only(), refusal))?;
@@ -166,15 +167,16 @@ pub(super) fn make_as_device(
         return Err("the frame of a pair was lost on its way through memory".into());
     };
     let mut record = Record::figures_only();
-    let (model, made) = receive((&mut inbox, *pair), (&device, options), place, &mut record, workspace)?;
+    let sent = (&mut inbox, *pair, pictures);
+    let (model, made) = receive(sent, (&device, options), place, &mut record, workspace)?;
     workspace.recycle(made);
     Ok(Model { time: start.elapsed(), ..model })
 }
 
-/// Reconstructs and writes what a device has sent, and keeps it; its shape stands in the inbox. The record must be
-/// one of figures only.
+/// Reconstructs and writes what a device has sent, and keeps it; its shape stands in the inbox, and its pictures may
+/// have come beside it. The record must be one of figures only.
 pub(super) fn receive(
-    (inbox, pair): (&mut Inbox, Pair),
+    (inbox, pair, pictures): (&mut Inbox, Pair, Option<[GrayImage; 2]>),
     (model, options): (&PairModel, &Options),
     place: Place<'_>,
     record: &mut Record,
@@ -185,12 +187,19 @@ pub(super) fn receive(
         for (k, eye) in record.eyes.iter_mut().enumerate() {
             (eye.parts.level, eye.parts.area) = (pair.levels[k], outcome.areas[k] as usize);
         }
-        workspace.reconstruct_shape((&mut inbox.memory(), outcome), model, options, record)
+        let seen = pictures.map(|pictures| Seen { pictures, levels: pair.levels });
+        workspace.reconstruct_shape((&mut inbox.memory(), outcome), seen, model, options, record)
     });
     let made = made.map_err(|refusal| place.refused(options, record, refusal))?;
     let calibration = &model.into();
     let run = Run { calibration, options, reconstruction: &made, record, truth: None };
-    Ok((Model::written(place, &run, start)?, made))
+    let mut written = Model::written(place, &run, start)?;
+    if options.front != Front::Balls && made.front.is_none() {
+        written
+            .warnings
+            .push("its pictures did not come with it, so that its visible side is from balls".into());
+    }
+    Ok((written, made))
 }
 
 impl Model {

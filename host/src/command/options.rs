@@ -50,10 +50,6 @@ pub struct MethodArgs {
     /// Prune the skeleton to so many branches, instead of by what stands out
     #[arg(long, value_name = "N")]
     branches: Option<u16>,
-    /// The visible side: from balls, from the grey levels of both images, or from these where they are to be
-    /// trusted [default: balls]
-    #[arg(long, value_enum, hide_possible_values = true, value_name = "balls|grey|auto")]
-    front: Option<Front>,
     #[command(flatten)]
     grow: GrowArgs,
 }
@@ -72,6 +68,10 @@ pub struct GrowArgs {
     /// Round cones between neighbouring balls, or the balls alone [default: cones]
     #[arg(long, value_enum, hide_possible_values = true, value_name = "cones|balls")]
     surface: Option<Pieces>,
+    /// The visible side: from balls, from the grey levels of both images, or from these where they are to be
+    /// trusted [default: balls]
+    #[arg(long, value_enum, hide_possible_values = true, value_name = "balls|grey|auto")]
+    front: Option<Front>,
     /// Grid spacing of the model's mesh, mm; its edges are about 0.6 of it [default: two to three pixels at the object]
     #[arg(long, value_parser = positive, value_name = "MM")]
     resolution: Option<f64>,
@@ -101,11 +101,6 @@ impl MethodArgs {
                 "--mode paper, --thinning and --branches are nothing that a device can be told",
             ));
         }
-        if self.front.is_some_and(|front| front != Front::Balls) {
-            return Err(usage(
-                "--front grey and auto need both images, and a device sends none; leave --front out",
-            ));
-        }
         let device = self.grow.device_options();
         Ok(Options {
             profile: self.profile.unwrap_or(device.profile),
@@ -133,7 +128,7 @@ impl MethodArgs {
                 "--skeleton, --radius and --surface belong to --mode default; the paper has its own",
             ));
         }
-        let front = self.front.unwrap_or_default();
+        let front = grow.front.unwrap_or_default();
         if front != Front::Balls && self.mode == Mode::Paper {
             return Err(usage("--front grey and auto belong to --mode default; the paper has balls alone"));
         }
@@ -164,6 +159,7 @@ impl GrowArgs {
             skeleton: self.skeleton.unwrap_or(device.skeleton),
             radius: self.radius.unwrap_or_default(),
             pieces: self.surface.unwrap_or_default(),
+            front: self.front.unwrap_or_default(),
             cell: self.resolution,
             ..device
         }

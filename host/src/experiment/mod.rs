@@ -17,6 +17,7 @@ use std::io;
 use std::path::Path;
 
 use crate::export::ExportError;
+use crate::reconstruct::Front;
 use crate::shape::Shape;
 use crate::unfinished;
 use branches::Point;
@@ -39,6 +40,8 @@ pub struct Effort {
     pub samples: usize,
     /// Skeletons of the animal with this many branches.
     pub branches: Vec<u16>,
+    /// Where the visible side of the default's models comes from.
+    pub front: Front,
 }
 
 impl Effort {
@@ -52,6 +55,7 @@ impl Effort {
             baseline_cell: 2.5,
             samples: 5_000,
             branches: (1..=16).collect(),
+            front: Front::default(),
         }
     }
 
@@ -65,6 +69,7 @@ impl Effort {
             baseline_cell: 6.0,
             samples: 1_000,
             branches: vec![1, 4, 8, 14],
+            front: Front::default(),
         }
     }
 
@@ -78,6 +83,8 @@ impl Effort {
 /// All that was found.
 #[derive(Debug, Serialize)]
 pub struct Experiments {
+    /// Where the visible side of the default's models comes from.
+    front: Front,
     /// Every shape, and at last the torus again, in noise.
     pub shapes: Vec<Study>,
     /// The animal by parts.
@@ -155,7 +162,7 @@ fn fill(folder: &Path, effort: &Effort, step: &(dyn Fn() + Sync)) -> Result<Expe
         figures::branches(&figures, subject, &grown).map_err(in_folder)?;
         branches = grown.into_iter().map(|(point, _)| point).collect();
     }
-    let found = Experiments { shapes, parts, branches };
+    let found = Experiments { front: effort.front, shapes, parts, branches };
     let json = serde_json::to_vec_pretty(&found)?;
     std::fs::write(folder.join("experiments.json"), json).map_err(in_folder)?;
     std::fs::write(folder.join("experiments.md"), page::page(&found)).map_err(in_folder)?;

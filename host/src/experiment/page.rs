@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use super::Experiments;
 use super::study::{Study, Way, section_mm};
+use crate::reconstruct::Front;
 use crate::report::pictures::NAMES;
 
 /// What stands where there is nothing.
@@ -16,6 +17,11 @@ pub(super) fn page(found: &Experiments) -> String {
          640 x 480 px, f = 750 px, 60 mm apart. Errors are mean distances between the surfaces, both \
          directions alike; percentages refer to the diagonal of the truth's box. Nothing is moved to fit.\n",
     );
+    if found.front != Front::Balls {
+        let text = "The visible side of the default's models, and of those along its curves, is measured in the grey \
+                    levels of both images.";
+        say(&mut page, text);
+    }
     stages(&mut page, found);
     models(&mut page, found);
     all_shapes(&mut page, found);

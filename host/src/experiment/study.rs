@@ -12,7 +12,7 @@ use crate::evaluate::{Evaluation, Options as Fineness, Section, evaluate};
 use crate::export::ExportError;
 use crate::mesh::Mesh;
 use crate::output;
-use crate::reconstruct::{Mode, Options, Skeleton, reconstruct};
+use crate::reconstruct::{Front, Mode, Options, Skeleton, reconstruct};
 use crate::render::{Noise, render};
 use crate::report::Run;
 use crate::report::record::Record;
@@ -155,7 +155,7 @@ pub(super) fn section_mm(section: &Section) -> Option<f64> {
 /// Makes a shape in every way; the default's files go into `folder`.
 pub(super) fn study(subject: &Subject, effort: &Effort, folder: &Path) -> Result<Study, ExportError> {
     let mut record = Record::new();
-    let options = Options { cell: effort.cell, ..Options::default() };
+    let options = Options { cell: effort.cell, front: effort.front, ..Options::default() };
     let full = subject.model(&options, &mut record);
     if let Ok(made) = &full {
         let run = Run {
@@ -171,7 +171,7 @@ pub(super) fn study(subject: &Subject, effort: &Effort, folder: &Path) -> Result
     let mesh = |way: Way| match way {
         Way::Full => full.as_ref().map(|made| made.mesh.clone()).map_err(Clone::clone),
         Way::Nurbs => own(Options { skeleton: Skeleton::Nurbs, ..options }),
-        Way::Paper => own(Options { mode: Mode::Paper { omega: 3 }, ..options }),
+        Way::Paper => own(Options { mode: Mode::Paper { omega: 3 }, front: Front::Balls, ..options }),
         Way::Hull => {
             baseline(subject, &record, |outlines, camera| visual_hull(outlines, camera, effort.baseline_cell))
         }

@@ -2,7 +2,8 @@
 //!
 //! glTF is in metres with y up. A model stands as the left camera sees it: x right, y up, z towards the
 //! camera. So (x, y, z) mm become (x, -y, -z) / 1000, a half turn about x, and faces stay outward. Curves
-//! are lines, or points where there are no edges, with the radius of each point, metres, as the attribute `_RADIUS`.
+//! are lines, or points where there are no edges, with the radius of each point, metres, as the attribute `_RADIUS`. The
+//! confidence of a mesh's vertices is the attribute `_CONFIDENCE`.
 
 use std::path::Path;
 
@@ -25,17 +26,21 @@ const POINTS: u32 = 0;
 const LINES: u32 = 1;
 const TRIANGLES: u32 = 4;
 
-/// Writes a mesh, with normals, so that it looks as smooth as it is.
+/// Writes a mesh, with normals, so that it looks as smooth as it is, and with how well each vertex is known, 0 to 1,
+/// unless there is nothing.
 ///
 /// # Errors
 ///
 /// If the file cannot be written, or is longer than the 4 GB that the format can say.
-pub fn write_mesh(path: &Path, mesh: &Mesh) -> Result<(), ExportError> {
+pub fn write_mesh(path: &Path, mesh: &Mesh, confidence: &[f64]) -> Result<(), ExportError> {
     let mut buffer = Buffer::default();
-    let attributes = json!({
+    let mut attributes = json!({
         "POSITION": buffer.positions(&mesh.vertices),
         "NORMAL": buffer.vectors(&normals(mesh)),
     });
+    if !confidence.is_empty() {
+        attributes["_CONFIDENCE"] = buffer.scalars(confidence.iter().map(|value| *value as f32));
+    }
     let indices = buffer.indices(mesh.faces.as_flattened());
     let primitive = json!({ "attributes": attributes, "indices": indices, "mode": TRIANGLES, "material": 0 });
     buffer.write(path, "model", &primitive)
@@ -50,8 +55,7 @@ pub fn write_curves(path: &Path, curves: &Curves) -> Result<(), ExportError> {
     let mut buffer = Buffer::default();
     let mut attributes = json!({ "POSITION": buffer.positions(&curves.points) });
     if !curves.radii.is_empty() {
-        let metres = curves.radii.iter().map(|r| (r / 1000.0) as f32);
-        attributes["_RADIUS"] = buffer.accessor("SCALAR", FLOAT, ARRAY_BUFFER, metres.map(f32::to_le_bytes));
+        attributes["_RADIUS"] = buffer.scalars(curves.radii.iter().map(|r| (r / 1000.0) as f32));
     }
     let mut primitive = json!({ "attributes": attributes, "mode": POINTS, "material": 0 });
     if !curves.edges.is_empty() {
@@ -104,6 +108,10 @@ impl Buffer {
             "bufferView": self.views.len() - 1, "componentType": component, "count": count, "type": type_,
         }));
         json!(self.accessors.len() - 1)
+    }
+
+    fn scalars(&mut self, values: impl Iterator<Item = f32>) -> Value {
+        self.accessor("SCALAR", FLOAT, ARRAY_BUFFER, values.map(f32::to_le_bytes))
     }
 
     fn vectors(&mut self, vectors: &[Vector3<f64>]) -> Value {

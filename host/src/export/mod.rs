@@ -53,7 +53,8 @@ pub enum ExportError {
     },
 }
 
-/// Writes a geometry in the format that the file's extension names: `ply`, `stl`, `obj`, `glb` or `swc`.
+/// Writes a geometry in the format that the file's extension names: `ply`, `stl`, `obj`, `glb` or `swc`. The confidence
+/// of vertices is left out unless [`holds_confidence`].
 ///
 /// # Errors
 ///
@@ -62,12 +63,15 @@ pub fn write(path: &Path, geometry: &Geometry) -> Result<(), ExportError> {
     let extension = path.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase);
     let refuse = |what: &str| Err(ExportError::Content { path: path.to_path_buf(), what: what.to_owned() });
     match (extension.as_deref(), geometry) {
-        (Some("ply"), Geometry::Mesh(mesh)) => ply::write_mesh(path, mesh, &[TITLE]),
+        (Some("ply"), Geometry::Mesh { mesh, confidence }) => {
+            let known = [("confidence", &confidence[..])];
+            ply::write_known_mesh(path, mesh, if confidence.is_empty() { &[] } else { &known }, &[TITLE])
+        }
         (Some("ply"), Geometry::Curves(curves)) => ply::write_curves(path, curves, &[TITLE]),
-        (Some("stl"), Geometry::Mesh(mesh)) => stl::write_mesh(path, mesh),
-        (Some("obj"), Geometry::Mesh(mesh)) => obj::write_mesh(path, mesh),
+        (Some("stl"), Geometry::Mesh { mesh, .. }) => stl::write_mesh(path, mesh),
+        (Some("obj"), Geometry::Mesh { mesh, .. }) => obj::write_mesh(path, mesh),
         (Some("obj"), Geometry::Curves(curves)) => obj::write_curves(path, curves),
-        (Some("glb"), Geometry::Mesh(mesh)) => glb::write_mesh(path, mesh),
+        (Some("glb"), Geometry::Mesh { mesh, confidence }) => glb::write_mesh(path, mesh, confidence),
         (Some("glb"), Geometry::Curves(curves)) => glb::write_curves(path, curves),
         (Some("swc"), Geometry::Curves(curves)) => swc::write_curves(path, curves),
         (Some("stl"), _) => refuse("STL holds triangles alone; curves go into .ply, .obj, .glb or .swc"),
@@ -77,6 +81,12 @@ pub fn write(path: &Path, geometry: &Geometry) -> Result<(), ExportError> {
         }
         _ => refuse("its name must end in .ply, .stl, .obj, .glb, .swc or .json"),
     }
+}
+
+/// Whether the format that the file's extension names holds the confidence of vertices.
+#[must_use]
+pub fn holds_confidence(path: &Path) -> bool {
+    ["ply", "glb"].iter().any(|extension| has_extension(path, extension))
 }
 
 /// Writes NURBS, which JSON alone holds with their radii.

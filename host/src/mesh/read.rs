@@ -60,7 +60,7 @@ pub enum ReadError {
 /// See [`ReadError`]; a mesh without vertices or faces is refused too.
 pub fn read(path: &Path) -> Result<Mesh, ReadError> {
     match read_geometry(path)? {
-        Geometry::Mesh(mesh) => Ok(mesh),
+        Geometry::Mesh { mesh, .. } => Ok(mesh),
         Geometry::Curves(_) => {
             Err(ReadError::Content { path: path.to_path_buf(), what: "it has no faces".into() })
         }
@@ -99,8 +99,8 @@ fn format(path: &Path) -> Result<Parse, ReadError> {
     let extension = path.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase);
     match extension.as_deref() {
         Some("ply") => Ok(ply::parse),
-        Some("obj") => Ok(|bytes| obj::parse(bytes).map(Geometry::Mesh)),
-        Some("stl") => Ok(|bytes| stl::parse(bytes).map(Geometry::Mesh)),
+        Some("obj") => Ok(|bytes| obj::parse(bytes).map(Geometry::from)),
+        Some("stl") => Ok(|bytes| stl::parse(bytes).map(Geometry::from)),
         _ => Err(ReadError::Extension { path: path.to_path_buf() }),
     }
 }
@@ -114,12 +114,18 @@ fn bytes_of(path: &Path) -> io::Result<Vec<u8>> {
 
 fn sound(geometry: Geometry) -> Result<Geometry, String> {
     let (points, elements, element) = match &geometry {
-        Geometry::Mesh(mesh) if mesh.faces.is_empty() => return Err("it has no faces".into()),
-        Geometry::Mesh(mesh) => (&mesh.vertices, mesh.faces.as_flattened(), "triangle"),
+        Geometry::Mesh { mesh, .. } if mesh.faces.is_empty() => return Err("it has no faces".into()),
+        Geometry::Mesh { mesh, .. } => (&mesh.vertices, mesh.faces.as_flattened(), "triangle"),
         Geometry::Curves(curves) => (&curves.points, curves.edges.as_flattened(), "edge"),
     };
     if let Some(vertex) = points.iter().position(|p| p.iter().any(|x| !(*x as f32).is_finite())) {
         return Err(format!("a coordinate of vertex {vertex} is not a finite number"));
+    }
+    if let Geometry::Mesh { confidence, .. } = &geometry {
+        let whole = confidence.is_empty() || confidence.len() == points.len();
+        if !whole || confidence.iter().any(|value| !value.is_finite()) {
+            return Err("a confidence is missing or not a finite number".into());
+        }
     }
     if let Geometry::Curves(curves) = &geometry {
         if points.is_empty() {
@@ -165,7 +171,7 @@ mod tests {
     fn coordinates_must_be_finite() {
         for x in ["nan", "inf", "1e999"] {
             let text = format!("v {x} 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
-            assert!(obj::parse(text.as_bytes()).map(Geometry::Mesh).and_then(sound).is_err(), "{x}");
+            assert!(obj::parse(text.as_bytes()).map(Geometry::from).and_then(sound).is_err(), "{x}");
         }
     }
 }

@@ -101,7 +101,7 @@ pub struct Options {
     pub radius: Radius,
     /// What the solid is made of (default mode).
     pub pieces: Pieces,
-    /// Where the visible side comes from; of a device's shape, which has no grey levels, always from balls.
+    /// Where the visible side comes from; of a device's shape from balls, unless its pictures came beside it.
     pub front: Front,
     /// Level between object and background.
     pub threshold: binarise::Threshold,

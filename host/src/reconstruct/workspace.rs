@@ -7,14 +7,15 @@ use crate::calibration::StereoCamera;
 use crate::memory::Storage;
 use crate::mesh::Mesh;
 use crate::mesh::body::Bodies;
-use crate::stage::front::{self, Sight};
-use crate::stage::rectify::{PixelBox, Rectification, RectifiedCamera, RectifyError};
+use crate::stage::front::{self, Pool, Sight};
+use crate::stage::rectify::{PixelBox, Rectification, RectifiedCamera, RectifyError, device_images};
 use crate::stage::surface::{Mesher, RoundCone};
 use image::GrayImage;
 use nalgebra::{Point2, Point3, Vector3};
 use shared::camera::PairModel;
 use shared::fixed::PX;
 use shared::pipeline::{self, Finding, Memory, Observer, Outcome, Settings, Side};
+use shared::stage::binarise::{Polarity, Threshold};
 use shared::stage::depth::Optics;
 use std::mem::take;
 
@@ -39,9 +40,20 @@ pub struct Workspace {
     mesher: Mesher,
     bodies: Bodies,
     mesh: Mesh,
+    /// Of the visible side.
+    pool: Pool,
     /// Of the skeleton.
     radii: Vec<f64>,
     clock: Clock,
+}
+
+/// The raw pictures of a pair that a device has described.
+#[derive(Clone, Debug)]
+pub struct Seen {
+    /// Left and right picture.
+    pub pictures: [GrayImage; 2],
+    /// Levels between object and background in them.
+    pub levels: [u8; 2],
 }
 
 /// What is known of a solid beside its round cones, which stand in [`Growth`].
@@ -74,13 +86,15 @@ impl Workspace {
         made
     }
 
-    /// As [`reconstruct_shape`](super::reconstruct_shape).
+    /// As [`reconstruct_shape`](super::reconstruct_shape); where its pictures were `seen`, its visible side may be
+    /// measured. Pictures in which the object is another are left aside.
     ///
     /// # Errors
     /// As [`Self::reconstruct`].
     pub fn reconstruct_shape(
         &mut self,
         (memory, outcome): (&mut Memory<'_>, Outcome),
+        seen: Option<Seen>,
         model: &PairModel,
         options: &Options,
         observer: &mut impl Observer,
@@ -91,7 +105,44 @@ impl Workspace {
         self.clock.lap("core");
         let solid = Solid { outcome, camera: model.into(), resampled: model.eyes.is_some() };
         grow(&mut self.growth, memory, &solid, options, &mut self.clock)?;
-        self.finish(solid, None, options)
+        let images = match seen.filter(|_| options.front != Front::Balls) {
+            Some(seen) => self.see(seen, &solid.outcome, model, options)?,
+            None => None,
+        };
+        self.finish(solid, images.as_ref().map(<[_; 2]>::each_ref), options)
+    }
+
+    /// The rectified pictures of a shape, with their masks in the core's memory; nothing if the object in them has
+    /// not the areas that the device found.
+    fn see(
+        &mut self,
+        seen: Seen,
+        outcome: &Outcome,
+        model: &PairModel,
+        options: &Options,
+    ) -> Result<Option<[GrayImage; 2]>, Refusal> {
+        let size = (u32::from(model.width), u32::from(model.height));
+        if seen.pictures.iter().any(|picture| picture.dimensions() != size) {
+            return Ok(None);
+        }
+        let images = device_images(model, seen.pictures)?;
+        for side in [Side::Left, Side::Right] {
+            let threshold = Threshold::Fixed(seen.levels[side as usize]);
+            // The level is told, but not on which side of it the object is.
+            let found = [Polarity::BrightObject, Polarity::DarkObject].into_iter().any(|polarity| {
+                let settings = Settings { threshold, polarity, ..core_settings(optics(model), options) };
+                let (image, storage) = (&images[side as usize], &mut self.storage);
+                object_box(image, side, &settings, storage).is_ok()
+                    && storage.masks().is_ok_and(|masks| {
+                        masks[side as usize].count() == outcome.areas[side as usize] as usize
+                    })
+            });
+            if !found {
+                return Ok(None);
+            }
+        }
+        self.clock.lap("rectify");
+        Ok(Some(images))
     }
 
     /// The solid of a pair, without its surface.
@@ -124,6 +175,9 @@ impl Workspace {
     /// Give back the lists of what was made and is done with, for the next pair.
     pub fn recycle(&mut self, made: Reconstruction) {
         self.mesh = made.mesh;
+        if let Some(front) = made.front {
+            self.pool.recycle(front.confidence);
+        }
         self.growth.skeleton = made.skeleton;
         self.growth.boundary = made.boundary;
         self.clock.laps = made.times;
@@ -151,7 +205,8 @@ impl Workspace {
                 let masks = self.storage.masks().map_err(Finding::from)?;
                 let rows = f64::from(outcome.vertical_offset) / 256.0;
                 let sight = Sight { images, masks, camera: &camera, rows };
-                let measured = front::measure(&mut self.mesh, &sight, options.front == Front::Auto);
+                let measured =
+                    front::measure(&self.pool, &mut self.mesh, &sight, options.front == Front::Auto);
                 self.clock.lap("front");
                 Some(measured)
             }
@@ -218,7 +273,7 @@ fn rectification(
     Ok(Rectification::around(calibration, boxes)?)
 }
 
-/// The box of the object in a raw image.
+/// The box of the object in an image, whose mask then stands in the core's memory.
 fn object_box(
     image: &GrayImage,
     side: Side,
@@ -227,8 +282,9 @@ fn object_box(
 ) -> Result<PixelBox, Finding> {
     let grey = grey(image)?;
     storage.fit(grey.size().width, grey.size().height)?;
-    let Memory { eyes: [eye, _], scratch, kernels, .. } = storage.lend();
-    let found = pipeline::object_box(side, grey, (eye.mask, scratch), (settings, &kernels))?;
+    let Memory { eyes, scratch, kernels, .. } = storage.lend();
+    let mask = &mut *eyes[side as usize].mask;
+    let found = pipeline::object_box(side, grey, (mask, scratch), (settings, &kernels))?;
     let corner = |p: shared::point::Pixel| Point2::new(f64::from(p.u), f64::from(p.v));
     Ok(PixelBox { min: corner(found.min), max: corner(found.max) })
 }

@@ -17,6 +17,7 @@ mod field;
 mod lattice;
 mod light;
 mod picture;
+mod pool;
 mod raster;
 mod stereo;
 mod system;
@@ -30,6 +31,8 @@ use lattice::rim;
 use light::highlights;
 use nalgebra::Point3;
 use picture::Picture;
+pub use pool::Pool;
+use pool::{Lent, Shelf};
 use raster::{Depths, Frame};
 use shared::bitmap::Bitmap;
 use stereo::{FULL, View, spread};
@@ -75,25 +78,29 @@ pub struct Measured {
 }
 
 /// Move the visible side of `mesh` to where both eyes see it: everywhere, or, if it is `gated`, where the grey levels
-/// are to be trusted.
+/// are to be trusted. The memory is the pool's.
 #[must_use]
-pub fn measure(mesh: &mut Mesh, sight: &Sight<'_>, gated: bool) -> Measured {
-    let images = [0, 1].map(|eye| project(mesh, sight.camera, eye));
-    let views = [0, 1].map(|eye| view(mesh, &images[eye], sight.images[eye], &sight.masks[eye], gated));
+pub fn measure(pool: &Pool, mesh: &mut Mesh, sight: &Sight<'_>, gated: bool) -> Measured {
+    let images = [0, 1].map(|eye| project(pool, mesh, sight.camera, eye));
+    let views =
+        [0, 1].map(|eye| view(pool, mesh, &images[eye], (sight.images[eye], &sight.masks[eye]), gated));
     let left = &views[0];
     let on = |(near, rim): (&f64, &f64)| near.is_finite() && *rim > 0.0;
-    let object: Vec<bool> = left.depths.near.iter().zip(&left.rim.levels).map(on).collect();
-    let (camera, rows, noise) = (sight.camera, sight.rows, noise(left));
-    let field = field::measure(&Scene { mesh, views: &views, camera, object: &object, noise, rows, gated });
+    let object = pool.flags.of(left.depths.near.iter().zip(left.rim.levels.iter()).map(on));
+    let (camera, rows, noise) = (sight.camera, sight.rows, noise(pool, left));
+    let field =
+        field::measure(&Scene { pool, mesh, views: &views, camera, object: &object, noise, rows, gated });
 
     let lattice = &field.lattice;
-    let change: Vec<f64> = lattice.unit.iter().zip(&field.moved).map(|(unit, moved)| unit * moved).collect();
-    let behind = warp(mesh, &images[0], &left.depths, |at| lattice.look_up(&change, at).unwrap_or(0.0));
+    let change =
+        pool.numbers.of(lattice.unit.iter().zip(field.moved.iter()).map(|(unit, moved)| unit * moved));
+    let behind =
+        warp(&pool.numbers, mesh, &images[0], &left.depths, |at| lattice.look_up(&change, at).unwrap_or(0.0));
     let share = |has: &dyn Fn(usize) -> bool| {
         lattice.nodes().filter(|&node| has(node)).count() as f64 / lattice.nodes().count().max(1) as f64
     };
     Measured {
-        confidence: confidence::of_vertices(&field, &images[0], &behind),
+        confidence: confidence::of_vertices(&field, &images[0], &behind).keep(),
         share: share(&|node| field.is_measured(node)),
         distrusted: share(&|node| field.held[node]),
         noise,
@@ -105,16 +112,22 @@ pub fn measure(mesh: &mut Mesh, sight: &Sight<'_>, gated: bool) -> Measured {
 }
 
 /// Column, row and 1 / depth of each vertex in an eye.
-fn project(mesh: &Mesh, camera: &RectifiedCamera, eye: usize) -> Vec<[f64; 3]> {
+fn project<'p>(pool: &'p Pool, mesh: &Mesh, camera: &RectifiedCamera, eye: usize) -> Lent<'p, [f64; 3]> {
     let seen = |vertex: &Point3<f64>| {
         let image = camera.project(vertex).map(|views| [views[eye].x, views[eye].y, 1.0 / vertex.z]);
         image.unwrap_or([f64::NAN; 3])
     };
-    mesh.vertices.iter().map(seen).collect()
+    pool.images.of(mesh.vertices.iter().map(seen))
 }
 
 /// What an eye sees around the object, and if it is `gated` what shines there.
-fn view(mesh: &Mesh, images: &[[f64; 3]], image: &GrayImage, mask: &Bitmap<'_>, gated: bool) -> View {
+fn view<'p>(
+    pool: &'p Pool,
+    mesh: &Mesh,
+    images: &[[f64; 3]],
+    (image, mask): (&GrayImage, &Bitmap<'_>),
+    gated: bool,
+) -> View<'p> {
     let size = [image.width() as i32, image.height() as i32];
     let side = |axis: usize| {
         let all = || images.iter().map(|image| image[axis]);
@@ -127,29 +140,34 @@ fn view(mesh: &Mesh, images: &[[f64; 3]], image: &GrayImage, mask: &Bitmap<'_>, 
     let ((u, width), (v, height)) = (side(0), side(1));
     let frame = Frame { corner: [u, v], width, height };
     let level = |[u, v]: [i32; 2]| f64::from(image.get_pixel(u as u32, v as u32).0[0]);
-    let picture = Picture { frame, levels: frame.pixels().map(level).collect() };
-    let inside: Vec<bool> = frame.pixels().map(|[u, v]| mask.get(u, v)).collect();
-    let rim = rim(&inside, width, REACH);
-    let ones = |set: &mut dyn Iterator<Item = bool>| set.map(|set| f64::from(u8::from(set))).collect();
+    let picture = Picture { frame, levels: pool.numbers.of(frame.pixels().map(level)) };
+    let inside = pool.flags.of(frame.pixels().map(|[u, v]| mask.get(u, v)));
+    let rim = rim(&pool.numbers, &inside, width, REACH);
+    let numbers = &pool.numbers;
     let mut view = View {
-        depths: Depths::of(mesh, images, frame),
-        core: ones(&mut rim.iter().map(|&rim| rim > 1.0)),
+        depths: Depths::of(pool, mesh, images, frame),
+        core: ones(numbers, rim.iter().map(|&rim| rim > 1.0)),
         rim: Picture { frame, levels: rim },
-        full: Picture { frame, levels: ones(&mut picture.levels.iter().map(|&level| level >= FULL)) },
-        shines: Picture { frame, levels: vec![0.0; picture.levels.len()] },
+        full: Picture { frame, levels: ones(numbers, picture.levels.iter().map(|&level| level >= FULL)) },
+        shines: Picture { frame, levels: numbers.filled(0.0, picture.levels.len()) },
         picture,
     };
     if gated {
-        view.shines.levels = ones(&mut highlights(&view, mesh).into_iter());
+        view.shines.levels = ones(numbers, highlights(pool, &view, mesh).iter().copied());
     }
     view
 }
 
+/// 1 for what is set, else 0.
+fn ones<'p>(shelf: &'p Shelf<f64>, set: impl Iterator<Item = bool>) -> Lent<'p, f64> {
+    shelf.of(set.map(|set| f64::from(u8::from(set))))
+}
+
 /// The standard deviation of a grey level, from the background around the object.
-fn noise(view: &View) -> f64 {
+fn noise(pool: &Pool, view: &View<'_>) -> f64 {
     let Frame { width, .. } = view.picture.frame;
-    let outside: Vec<bool> = view.rim.levels.iter().map(|&rim| rim == 0.0).collect();
-    let far = rim(&outside, width, 6);
+    let outside = pool.flags.of(view.rim.levels.iter().map(|&rim| rim == 0.0));
+    let far = rim(&pool.numbers, &outside, width, 6);
     let levels = &view.picture.levels;
     let deviation = |place: usize| {
         let around =
@@ -158,5 +176,5 @@ fn noise(view: &View) -> f64 {
     };
     let inner = |place: &usize| far[*place] >= 5.0 && *place > width && *place + width + 1 < levels.len();
     // The mean has a ninth of the level itself.
-    spread((0..levels.len()).filter(inner).map(deviation)) * 3.0 / 8.0_f64.sqrt()
+    spread(&pool.numbers, (0..levels.len()).filter(inner).map(deviation)) * 3.0 / 8.0_f64.sqrt()
 }

@@ -39,6 +39,7 @@ use shared::limits::CapacityError;
 
 use crate::calibration::{CalibrationError, Camera, StereoCamera};
 use canvas::Canvas;
+pub use device::device_images;
 
 /// Longest side of a rectified image, px: coordinates of 1/16 px still fit 16 bits with a sign.
 pub const MAX_SIDE: u32 = 2047;

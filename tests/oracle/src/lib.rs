@@ -4,6 +4,7 @@ pub mod board;
 pub mod browser;
 pub mod camera;
 pub mod cases;
+pub mod confidence;
 pub mod core;
 pub mod device;
 pub mod emulated;

@@ -13,11 +13,12 @@ use crate::live::View;
 use crate::reconstruct::{Options, Workspace};
 use crate::report::record::Record;
 use crate::source::serial::inbox::{Hello, Inbox, Message, Pair};
+use crate::source::serial::mosaic::Mosaic;
 use crate::source::serial::session::{Session, SessionError, Tally};
 use indicatif::ProgressBar;
 use serde_json::{Value, json};
 use shared::camera::PairModel;
-use shared::wire::ToDevice;
+use shared::wire::{PictureKind, ToDevice};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -52,6 +53,8 @@ pub(super) struct Desk<'a> {
     refusals: [Option<String>; ORDERS.len()],
     /// If they are wanted.
     timings: Option<Timings>,
+    /// The pictures that came last.
+    mosaic: Mosaic,
     workspace: Workspace,
     bar: ProgressBar,
     start: Instant,
@@ -76,6 +79,7 @@ impl<'a> Desk<'a> {
             gains: [GAIN; 2],
             refusals: Default::default(),
             timings: timings.then(Timings::begin),
+            mosaic: Mosaic::new(PictureKind::Grey),
             workspace: Workspace::default(),
             bar: progress(),
             start: Instant::now(),
@@ -136,6 +140,8 @@ impl<'a> Desk<'a> {
 
     pub(super) fn greeted(&mut self, hello: &Hello) -> Result<(), Failure> {
         check_calibration(self.model, hello)?;
+        // It numbers its pairs anew.
+        self.mosaic = Mosaic::new(PictureKind::Grey);
         self.line(
             || json!({ "device": hello_as_json(hello) }),
             || {
@@ -152,7 +158,14 @@ impl<'a> Desk<'a> {
 
     /// One message; so many before it were lost.
     pub(super) fn take(&mut self, inbox: &mut Inbox, message: Message, lost: u32) -> Result<(), Failure> {
-        let Message::Pair(pair) = message else { return Ok(()) };
+        let pair = match message {
+            Message::Pair(pair) => pair,
+            Message::Picture(part) => {
+                self.mosaic.add(&part);
+                return Ok(());
+            }
+            _ => return Ok(()),
+        };
         self.pairs += 1;
         let name = format!("{:06}", self.pairs);
         let folder = self.out.map(|out| out.join(&name));
@@ -199,14 +212,16 @@ impl<'a> Desk<'a> {
     /// The model of a pair, in its folder if there is one, and on the page if there is one.
     fn make(
         &mut self,
-        pair: (&mut Inbox, Pair),
+        (inbox, pair): (&mut Inbox, Pair),
         (name, folder): (String, Option<&Path>),
         lost: u32,
     ) -> Result<Model, Failure> {
         let arrived = Instant::now();
         let mut record = Record::figures_only();
         let place = Place { folder, report: self.json, page: self.page };
-        let made = model::receive(pair, (self.model, self.options), place, &mut record, &mut self.workspace);
+        let pictures = self.mosaic.pictures_of(pair.number);
+        let sent = (inbox, pair, pictures);
+        let made = model::receive(sent, (self.model, self.options), place, &mut record, &mut self.workspace);
         let Some(view) = &mut self.view else {
             let (model, made) = made?;
             self.workspace.recycle(made);

@@ -3,9 +3,12 @@
 use super::Args;
 use super::desk::Desk;
 use crate::live::control::Settings;
+use crate::reconstruct::{Front, Options};
 use crate::source::exposure::Exposure;
+use crate::source::serial::inbox::Message;
 use crate::source::serial::session::{Session, SessionError};
-use shared::wire::{self, ExposureSetting, ToDevice};
+use shared::wire::{self, ExposureSetting, PictureKind, ToDevice};
+use std::mem::take;
 
 /// What a device can be told of how it looks.
 pub(super) const ORDERS: [&str; 3] = ["threshold", "polarity", "exposure"];
@@ -16,29 +19,61 @@ pub(super) struct Orders {
     kept: [Option<ToDevice>; ORDERS.len()],
     /// What of the page the device was told.
     settings: Settings,
+    /// Whether the pictures of each pair are wanted, and of the next one are to be asked for.
+    pictures: bool,
+    due: bool,
+    /// The pair that was heard of last.
+    pair: Option<u32>,
 }
 
 impl Orders {
     /// What the flags say, and with a page all that it shows as set.
-    pub(super) fn new(args: &Args, settings: Settings) -> Self {
+    pub(super) fn new(args: &Args, settings: Settings, options: &Options) -> Self {
         let shown = args.view.is_wanted();
         let threshold = args.threshold.or_else(|| shown.then_some(settings.threshold));
         let polarity = args.polarity.or_else(|| shown.then_some(settings.polarity));
-        Self { kept: [threshold.map(ToDevice::Threshold), polarity.map(ToDevice::Polarity), None], settings }
+        let kept = [threshold.map(ToDevice::Threshold), polarity.map(ToDevice::Polarity), None];
+        let pictures = options.front != Front::Balls;
+        Self { kept, settings, pictures, due: pictures, pair: None }
     }
 
     /// Has a device that was greeted begin.
-    pub(super) fn start(&self, session: &mut Session, desk: &mut Desk<'_>) -> Result<(), SessionError> {
+    pub(super) fn start(&mut self, session: &mut Session, desk: &mut Desk<'_>) -> Result<(), SessionError> {
         for (which, order) in self.kept.iter().enumerate() {
             if let Some(order) = order {
                 desk.give(session, which, order)?;
             }
         }
-        session.order_cameras(&ToDevice::Start)
+        session.order_cameras(&ToDevice::Start)?;
+        (self.due, self.pair) = (self.pictures, None);
+        self.ask_for_pictures(session)
     }
 
-    /// Passes on what was changed on the page.
+    /// Hears what the device says: when it has begun another pair, the pictures of the next one can be asked for. It
+    /// takes such an order once a pair, and keeps one.
+    pub(super) fn note(&mut self, message: &Message) {
+        let pair = match message {
+            Message::Picture(part) => part.pair,
+            Message::Pair(pair) => pair.number,
+            _ => return,
+        };
+        self.due |= self.pictures && self.pair.replace(pair) != Some(pair);
+    }
+
+    fn ask_for_pictures(&mut self, session: &mut Session) -> Result<(), SessionError> {
+        if !take(&mut self.due) {
+            return Ok(());
+        }
+        match session.order(&ToDevice::Grab(PictureKind::Grey)) {
+            // It has this order already, or its cameras are being started again: it is asked at the next pair.
+            Err(SessionError::Refused(_)) => Ok(()),
+            result => result,
+        }
+    }
+
+    /// Asks for pictures that are due, and passes on what was changed on the page.
     pub(super) fn follow(&mut self, session: &mut Session, desk: &mut Desk<'_>) -> Result<(), SessionError> {
+        self.ask_for_pictures(session)?;
         let Some(view) = &desk.view else { return Ok(()) };
         let ((settings, _), before) = (view.control().settings(), self.settings);
         let exposure = settings.exposure.filter(|_| settings.exposure != before.exposure);

@@ -1,5 +1,5 @@
 //! PLY (G. Turk, "The PLY Polygon File Format", 1994): ascii and binary, either byte order, with any
-//! elements and properties around the `x y z` and `radius` of `vertex`, the list of `face` and the ends of
+//! elements and properties around the `x y z`, `radius` and `confidence` of `vertex`, the list of `face` and the ends of
 //! `edge`, which are all that is kept.
 
 use std::str::SplitAsciiWhitespace;
@@ -32,9 +32,9 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Geometry, String> {
             .read(&mut values, &mut kept)
             .map_err(|what| format!("in element {}: {what}", element.name))?;
     }
-    let Kept { points, radii, edges, faces } = kept;
+    let Kept { points, radii, confidence, edges, faces } = kept;
     if header.elements.iter().any(|element| element.name == "face") {
-        return Ok(Geometry::Mesh(Mesh { vertices: points, faces }));
+        return Ok(Geometry::Mesh { mesh: Mesh { vertices: points, faces }, confidence });
     }
     Ok(Geometry::Curves(Curves { points, radii, edges }))
 }
@@ -44,6 +44,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Geometry, String> {
 struct Kept {
     points: Vec<Point3<f64>>,
     radii: Vec<f64>,
+    confidence: Vec<f64>,
     edges: Vec<[u32; 2]>,
     faces: Vec<[u32; 3]>,
 }
@@ -187,7 +188,7 @@ impl Element {
 
     fn read_vertices(&self, values: &mut Values, kept: &mut Kept) -> Result<(), String> {
         let axes = [self.place("x")?, self.place("y")?, self.place("z")?];
-        let radius = self.place("radius").ok();
+        let [radius, confidence] = ["radius", "confidence"].map(|name| self.place(name).ok());
         for _ in 0..self.count {
             let mut vertex = Point3::origin();
             for (i, property) in self.properties.iter().enumerate() {
@@ -197,6 +198,8 @@ impl Element {
                         vertex[axis] = value;
                     } else if radius == Some(i) {
                         kept.radii.push(value);
+                    } else if confidence == Some(i) {
+                        kept.confidence.push(value);
                     }
                 })?;
             }
@@ -368,7 +371,7 @@ mod tests {
     #[test]
     fn the_three_formats_give_the_same_mesh() {
         let parsed = parse(&ascii()).unwrap();
-        let Geometry::Mesh(mesh) = &parsed else { panic!("{parsed:?}") };
+        let Geometry::Mesh { mesh, .. } = &parsed else { panic!("{parsed:?}") };
         assert_eq!(
             mesh.vertices,
             [[0.0, 0.0, 5.0], [1.0, 0.0, 5.0], [1.0, 1.0, 5.0], [0.0, 1.0, 5.0]].map(Point3::from)

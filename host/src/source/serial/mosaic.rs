@@ -57,6 +57,12 @@ impl Mosaic {
         }
     }
 
+    /// Both pictures of this pair, when they are whole.
+    #[must_use]
+    pub fn pictures_of(&self, pair: u32) -> Option<[GrayImage; 2]> {
+        self.pictures().filter(|_| self.pair == Some(pair))
+    }
+
     /// Both pictures, when they are whole; a mask is 0 and 255.
     #[must_use]
     pub fn pictures(&self) -> Option<[GrayImage; 2]> {

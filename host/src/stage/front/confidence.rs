@@ -8,6 +8,7 @@
 //!   stereo says of a node it says of its surroundings too, since the surface bends little.
 
 use super::field::Field;
+use super::pool::Lent;
 
 /// Nodes around one that speak for it, on each side.
 const AROUND: usize = 3;
@@ -21,10 +22,11 @@ const BACK: f64 = 0.4;
 const SHARED: f64 = 2.0;
 
 /// The confidence of vertices whose images are `images`, and which lie `behind` the front.
-pub(super) fn of_vertices(field: &Field, images: &[[f64; 3]], behind: &[f64]) -> Vec<f64> {
+pub(super) fn of_vertices<'p>(field: &Field<'p>, images: &[[f64; 3]], behind: &[f64]) -> Lent<'p, f64> {
     let lattice = &field.lattice;
     let known = lattice.sums_around(&field.known, AROUND);
-    let (mut front, mut back) = (vec![0.0; known.len()], vec![0.0; known.len()]);
+    let shelf = known.shelf();
+    let [mut front, mut back] = [(); 2].map(|()| shelf.filled(0.0, known.len()));
     for node in lattice.nodes() {
         let off = |share: f64| (LEAST + share * lattice.half[node]).powi(2);
         let mm = lattice.unit[node] * lattice.depth[node];
@@ -39,5 +41,5 @@ pub(super) fn of_vertices(field: &Field, images: &[[f64; 3]], behind: &[f64]) ->
         let square = at(&front) * (1.0 - behind) + at(&back) * behind;
         1.0 / (1.0 + square.sqrt())
     };
-    images.iter().zip(behind).map(confidence).collect()
+    shelf.of(images.iter().zip(behind).map(confidence))
 }

@@ -14,7 +14,8 @@
 
 use super::lattice::{Lattice, RIM, Stencil};
 use super::picture::Picture;
-use super::stereo::{Response, View, look, respond, spread, visible};
+use super::pool::{Lent, Pool, Shelf};
+use super::stereo::{Response, Seen, View, look, respond, spread, visible};
 use super::system::System;
 use crate::mesh::Mesh;
 use crate::stage::rectify::RectifiedCamera;
@@ -50,24 +51,26 @@ const EVIDENCE: f64 = 8.0;
 const ROUNDED: f64 = 0.1;
 
 /// What was found.
-#[derive(Clone, Debug)]
-pub(super) struct Field {
-    pub(super) lattice: Lattice,
+#[derive(Debug)]
+pub(super) struct Field<'p> {
+    pub(super) lattice: Lattice<'p>,
     /// Displacement of each node.
-    pub(super) moved: Vec<f64>,
+    pub(super) moved: Lent<'p, f64>,
     /// What stereo says of each node: the inverse square of its displacement's standard deviation.
-    pub(super) known: Vec<f64>,
+    pub(super) known: Lent<'p, f64>,
     /// Nodes at which the ball model is held to.
-    pub(super) held: Vec<bool>,
+    pub(super) held: Lent<'p, bool>,
     pub(super) response: Response,
     /// Standard deviations of the residuals, grey levels: of the ball model, and of what was measured.
     pub(super) spreads: [f64; 2],
 }
 
 /// What a displacement is found from.
-pub(super) struct Scene<'a> {
+pub(super) struct Scene<'a, 'p> {
+    /// Where lists come from.
+    pub(super) pool: &'p Pool,
     pub(super) mesh: &'a Mesh,
-    pub(super) views: &'a [View; 2],
+    pub(super) views: &'a [View<'p>; 2],
     pub(super) camera: &'a RectifiedCamera,
     /// Pixels that the model and the mask of the left view both hold.
     pub(super) object: &'a [bool],
@@ -80,7 +83,7 @@ pub(super) struct Scene<'a> {
 }
 
 /// Find the displacements.
-pub(super) fn measure(scene: &Scene<'_>) -> Field {
+pub(super) fn measure<'p>(scene: &Scene<'_, 'p>) -> Field<'p> {
     let least = (NOISY.0 * scene.noise).min(NOISY.1);
     let pictures = |blur: f64| {
         // What noise asks for comes on top of the sharpest.
@@ -101,23 +104,24 @@ pub(super) fn measure(scene: &Scene<'_>) -> Field {
         field.refine(scene, &sharpest, GATED);
         residuals = field.residuals(scene, &sharpest);
     }
-    field.spreads = spreads(&residuals);
+    field.spreads = spreads(&scene.pool.numbers, &residuals);
     field
 }
 
-impl Field {
+impl<'p> Field<'p> {
     /// The ball model on a lattice.
-    fn new(scene: &Scene<'_>, step: usize) -> Self {
+    fn new(scene: &Scene<'_, 'p>, step: usize) -> Self {
         let left = &scene.views[0];
-        let lattice = Lattice::new(step, &left.depths, scene.object, &left.rim.levels, scene.camera.f);
+        let (pool, rim) = (scene.pool, &left.rim.levels);
+        let lattice = Lattice::new(pool, step, &left.depths, (scene.object, rim), scene.camera.f);
         let held = |node: usize| {
             let [u, v] = lattice.at[node];
             lattice.on[node] && left.shines.at(u, v) > 0.1
         };
         Self {
-            moved: vec![0.0; lattice.on.len()],
-            known: vec![0.0; lattice.on.len()],
-            held: (0..lattice.on.len()).map(held).collect(),
+            moved: pool.numbers.filled(0.0, lattice.on.len()),
+            known: pool.numbers.filled(0.0, lattice.on.len()),
+            held: pool.flags.of((0..lattice.on.len()).map(held)),
             response: Response { gain: 1.0, offset: 0.0, rows: scene.rows },
             spreads: [0.0; 2],
             lattice,
@@ -125,7 +129,7 @@ impl Field {
     }
 
     /// The same displacements on a finer lattice.
-    fn finer(self, scene: &Scene<'_>, step: usize) -> Self {
+    fn finer(self, scene: &Scene<'_, 'p>, step: usize) -> Self {
         let mut finer = Self { response: self.response, ..Self::new(scene, step) };
         for node in finer.lattice.nodes() {
             let moved = self.lattice.look_up(&self.moved, finer.lattice.at[node]);
@@ -135,18 +139,18 @@ impl Field {
     }
 
     /// Rounds of Gauss-Newton.
-    fn refine(&mut self, scene: &Scene<'_>, pictures: &[Picture; 2], rounds: usize) {
+    fn refine(&mut self, scene: &Scene<'_, 'p>, pictures: &[Picture<'p>; 2], rounds: usize) {
         let lattice = &self.lattice;
         let visible = visible(lattice, scene);
-        let mut system = System::new(lattice.width, lattice.on.len());
-        let mut step = vec![0.0; lattice.on.len()];
+        let mut system = System::new(&scene.pool.numbers, lattice.width, lattice.on.len());
+        let mut step = scene.pool.numbers.filled(0.0, lattice.on.len());
         let sigma = scene.noise.max(SIGMA);
         for _ in 0..rounds {
             system.clear();
             trust_balls(lattice, &self.moved, &self.held, &mut system);
             bend(lattice, &self.moved, &mut system);
             let seen = look(lattice, &visible, pictures, scene, (&self.moved, &self.response));
-            self.response = respond(&seen, self.response, scene.rows);
+            self.response = respond(&scene.pool.numbers, &seen, self.response, scene.rows);
             self.known.fill(0.0);
             for seen in seen.iter().filter(|seen| seen.counts && !self.held[seen.node]) {
                 let residual = seen.residual(&self.response);
@@ -168,28 +172,31 @@ impl Field {
     }
 
     /// What the ball model and the displacements leave unexplained, grey levels, at the nodes where both can be told.
-    fn residuals(&self, scene: &Scene<'_>, pictures: &[Picture; 2]) -> Vec<(usize, [f64; 2])> {
+    fn residuals(&self, scene: &Scene<'_, 'p>, pictures: &[Picture<'p>; 2]) -> Lent<'p, (usize, [f64; 2])> {
         let lattice = &self.lattice;
         let visible = visible(lattice, scene);
         let see = |moved: &[f64]| {
             // Each has the response that suits it best.
             let seen = look(lattice, &visible, pictures, scene, (moved, &self.response));
-            let response = respond(&seen, self.response, scene.rows);
+            let response = respond(&scene.pool.numbers, &seen, self.response, scene.rows);
             let seen = look(lattice, &visible, pictures, scene, (moved, &response));
-            seen.iter().map(|seen| seen.counts.then(|| seen.residual(&response))).collect::<Vec<_>>()
+            let residual = |seen: &Seen| seen.counts.then(|| seen.residual(&response));
+            scene.pool.residuals.of(seen.iter().map(residual))
         };
-        let [balls, measured] = [see(&vec![0.0; self.moved.len()]), see(&self.moved)];
-        let both = |((&node, balls), measured): ((&usize, _), _)| {
+        let still = scene.pool.numbers.filled(0.0, self.moved.len());
+        let [balls, measured] = [see(&still), see(&self.moved)];
+        let both = |((&node, &balls), &measured): ((&usize, &Option<f64>), &Option<f64>)| {
             Option::zip(balls, measured).map(|(b, m)| (node, [b, m]))
         };
-        visible.iter().zip(balls).zip(measured).filter_map(both).collect()
+        scene.pool.both.of(visible.iter().zip(balls.iter()).zip(measured.iter()).filter_map(both))
     }
 
     /// Put the nodes back on the ball model where the residuals do not speak against it, and hold them to it.
     fn gate(&mut self, residuals: &[(usize, [f64; 2])]) {
-        let sigma = ROBUST * spreads(residuals)[1].max(ROUNDED);
+        let shelf = self.moved.shelf();
+        let sigma = ROBUST * spreads(shelf, residuals)[1].max(ROUNDED);
         let unlikely = |residual: f64| ROBUST * ROBUST / 2.0 * libm::log1p((residual / sigma).powi(2));
-        let mut evidence = vec![0.0; self.moved.len()];
+        let mut evidence = shelf.filled(0.0, self.moved.len());
         for &(node, [balls, measured]) in residuals {
             evidence[node] = unlikely(balls) - unlikely(measured);
         }
@@ -209,18 +216,18 @@ impl Field {
 }
 
 /// Standard deviations of both residuals.
-fn spreads(residuals: &[(usize, [f64; 2])]) -> [f64; 2] {
-    [0, 1].map(|of| spread(residuals.iter().map(|(_, both)| both[of])))
+fn spreads(shelf: &Shelf<f64>, residuals: &[(usize, [f64; 2])]) -> [f64; 2] {
+    [0, 1].map(|of| spread(shelf, residuals.iter().map(|(_, both)| both[of])))
 }
 
 /// What the ball model weighs at a node, if it is trusted so `firm`ly.
-fn prior(lattice: &Lattice, node: usize, firm: f64) -> f64 {
+fn prior(lattice: &Lattice<'_>, node: usize, firm: f64) -> f64 {
     let off = libm::hypot(OFF[0], OFF[1] * lattice.half[node]) / lattice.depth[node];
     lattice.area() * firm * (lattice.unit[node] / off).powi(2)
 }
 
 /// The ball model, held to at the outline and where nothing speaks against it, and preferred elsewhere.
-fn trust_balls(lattice: &Lattice, moved: &[f64], held: &[bool], system: &mut System) {
+fn trust_balls(lattice: &Lattice<'_>, moved: &[f64], held: &[bool], system: &mut System<'_>) {
     for node in lattice.nodes() {
         let firm = if lattice.rim[node] < RIM || held[node] { 1.0 } else { WEAK };
         system.add(node, prior(lattice, node, firm), moved[node], 1.0);
@@ -228,13 +235,13 @@ fn trust_balls(lattice: &Lattice, moved: &[f64], held: &[bool], system: &mut Sys
 }
 
 /// Second differences of displacements.
-fn bend(lattice: &Lattice, moved: &[f64], system: &mut System) {
+fn bend(lattice: &Lattice<'_>, moved: &[f64], system: &mut System<'_>) {
     // A second difference grows with the square of the step, a change of slope with the step.
     let scale = lattice.area().sqrt();
     let (sigma, crease) = (BEND * scale * scale, CREASE * scale);
     let weight = |value: f64| lattice.area() / (sigma * sigma) / (1.0 + (value / crease).powi(2));
     let root = std::f64::consts::SQRT_2;
-    for stencil in &lattice.stencils {
+    for stencil in lattice.stencils.iter() {
         let along = |by: usize, node: usize| [node - by, node, node + by];
         let line = match *stencil {
             Stencil::Along(node) => along(1, node),

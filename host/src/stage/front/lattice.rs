@@ -5,6 +5,7 @@
 //!   stencils of second differences, none across a jump in depth.
 //! * **Cost**: the pixels of the frame.
 
+use super::pool::{Lent, Pool, Shelf};
 use super::raster::Depths;
 use super::system::MARGIN;
 
@@ -29,37 +30,44 @@ pub(super) enum Stencil {
 }
 
 /// The lattice.
-#[derive(Clone, Debug)]
-pub(super) struct Lattice {
+#[derive(Debug)]
+pub(super) struct Lattice<'p> {
     /// Side of a square, px.
     pub(super) step: usize,
     /// Nodes in a row, margins included.
     pub(super) width: usize,
     /// Whether a node lies on the object; what follows is meaningful there alone.
-    pub(super) on: Vec<bool>,
+    pub(super) on: Lent<'p, bool>,
     /// Image of the node, px.
-    pub(super) at: Vec<[f64; 2]>,
+    pub(super) at: Lent<'p, [f64; 2]>,
     /// Depth of the model's front, mm.
-    pub(super) depth: Vec<f64>,
+    pub(super) depth: Lent<'p, f64>,
     /// Half of the model's thickness, mm.
-    pub(super) half: Vec<f64>,
+    pub(super) half: Lent<'p, f64>,
     /// Distance to the outline, px, up to the reach of `rim`.
-    pub(super) rim: Vec<f64>,
+    pub(super) rim: Lent<'p, f64>,
     /// Change of ln depth by a displacement of 1.
-    pub(super) unit: Vec<f64>,
-    pub(super) stencils: Vec<Stencil>,
+    pub(super) unit: Lent<'p, f64>,
+    pub(super) stencils: Lent<'p, Stencil>,
     corner: [i32; 2],
 }
 
-impl Lattice {
+impl<'p> Lattice<'p> {
     /// The lattice of squares of `step` px over the pixels of `object`, which have `rim` px to the outline.
-    pub(super) fn new(step: usize, depths: &Depths, object: &[bool], rim: &[f64], focal: f64) -> Self {
+    pub(super) fn new(
+        pool: &'p Pool,
+        step: usize,
+        depths: &Depths<'_>,
+        (object, rim): (&[bool], &[f64]),
+        focal: f64,
+    ) -> Self {
         let frame = depths.frame;
         let [columns, rows] = [frame.width, frame.height].map(|side| side.div_ceil(step));
         let width = columns + 2 * MARGIN;
         let nodes = width * (rows + 2 * MARGIN);
-        let zeros = || vec![0.0; nodes];
-        let (mut count, mut at) = (vec![0_usize; nodes], vec![[0.0; 2]; nodes]);
+        let zeros = || pool.numbers.filled(0.0, nodes);
+        let mut count = pool.places.filled(0, nodes);
+        let mut at = pool.pixels.filled([0.0; 2], nodes);
         let (mut depth, mut half, mut rims) = (zeros(), zeros(), zeros());
         for (place, [u, v]) in frame.pixels().enumerate().filter(|(place, _)| object[*place]) {
             let node = (place / frame.width / step + MARGIN) * width + place % frame.width / step + MARGIN;
@@ -81,8 +89,8 @@ impl Lattice {
             rims[node] /= pixels;
             unit[node] = libm::hypot(half[node], SOFT) / depth[node].max(f64::MIN_POSITIVE);
         });
-        let on: Vec<bool> = count.iter().map(|&count| count >= least).collect();
-        let stencils = stencils(width, &on, &depth, &rims, STEEPEST * step as f64 / focal);
+        let on = pool.flags.of(count.iter().map(|&count| count >= least));
+        let stencils = stencils(&pool.stencils, width, (&on, &depth, &rims), STEEPEST * step as f64 / focal);
         Self { step, width, on, at, depth, half, rim: rims, unit, stencils, corner: frame.corner }
     }
 
@@ -97,7 +105,7 @@ impl Lattice {
     }
 
     /// The sums over the nodes around each, up to `reach` away in both directions.
-    pub(super) fn sums_around(&self, values: &[f64], reach: usize) -> Vec<f64> {
+    pub(super) fn sums_around(&self, values: &[f64], reach: usize) -> Lent<'p, f64> {
         let (width, rows) = (self.width, self.on.len() / self.width);
         let span = |k: usize, length: usize| k.saturating_sub(reach)..(k + reach + 1).min(length);
         let place = |k: usize| (k / width, k % width);
@@ -105,12 +113,12 @@ impl Lattice {
             let (row, column) = place(k);
             span(column, width).map(|column| values[row * width + column]).sum()
         };
-        let sums: Vec<f64> = (0..values.len()).map(across).collect();
+        let sums = self.depth.shelf().of((0..values.len()).map(across));
         let down = |k: usize| {
             let (row, column) = place(k);
             span(row, rows).map(|row| sums[row * width + column]).sum()
         };
-        (0..values.len()).map(down).collect()
+        self.depth.shelf().of((0..values.len()).map(down))
     }
 
     /// What nodes have, at a place of the image: bilinear between those on the object, or the mean of the nearest
@@ -163,9 +171,14 @@ pub(super) fn mean_near(
 
 /// The second differences of nodes on the object whose depths differ by no more than `steepest` of the depth from
 /// one to the next.
-fn stencils(width: usize, on: &[bool], depth: &[f64], rim: &[f64], steepest: f64) -> Vec<Stencil> {
+fn stencils<'p>(
+    shelf: &'p Shelf<Stencil>,
+    width: usize,
+    (on, depth, rim): (&[bool], &[f64], &[f64]),
+    steepest: f64,
+) -> Lent<'p, Stencil> {
     let near = |a: usize, b: usize| on[a] && on[b] && (depth[a] - depth[b]).abs() < steepest * depth[a];
-    let mut stencils = Vec::new();
+    let mut stencils = shelf.empty(3 * on.len());
     for node in (0..on.len()).filter(|&node| on[node]) {
         if near(node - 1, node) && near(node, node + 1) {
             stencils.push(Stencil::Along(node));
@@ -190,10 +203,10 @@ fn stencils(width: usize, on: &[bool], depth: &[f64], rim: &[f64], steepest: f64
 }
 
 /// Distance of each pixel to the nearest one that is not set, px, up to `reach`; all outside the frame is unset.
-pub(super) fn rim(set: &[bool], width: usize, reach: usize) -> Vec<f64> {
+pub(super) fn rim<'p>(shelf: &'p Shelf<f64>, set: &[bool], width: usize, reach: usize) -> Lent<'p, f64> {
     let height = set.len() / width.max(1);
     let most = reach as f64;
-    let mut down = vec![0.0_f64; set.len()];
+    let mut down = shelf.filled(0.0, set.len());
     for u in 0..width {
         for v in (0..height).filter(|v| set[v * width + u]) {
             let clear = |distance: &usize| {
@@ -205,14 +218,14 @@ pub(super) fn rim(set: &[bool], width: usize, reach: usize) -> Vec<f64> {
     }
     let nearest = |place: usize| {
         let (row, u) = (place - place % width, place % width);
-        let across = |du: i64| {
+        let square = |du: i64| {
             let column = u as i64 + du;
             let inside = column >= 0 && column < width as i64;
             let below = if inside { down[row + column as usize] } else { 0.0 };
-            libm::hypot(below, du as f64)
+            below * below + (du * du) as f64
         };
         let reach = reach as i64;
-        if set[place] { (-reach..=reach).map(across).fold(most, f64::min) } else { 0.0 }
+        if set[place] { (-reach..=reach).map(square).fold(most * most, f64::min).sqrt() } else { 0.0 }
     };
-    (0..set.len()).map(nearest).collect()
+    shelf.of((0..set.len()).map(nearest))
 }

@@ -10,6 +10,7 @@
 //! * **Cost**: the pixels of the object, and for each highlight about the square of its area.
 
 use super::lattice::rim;
+use super::pool::{Lent, Pool};
 use super::raster::{Frame, NOTHING};
 use super::stereo::{FULL, View, spread};
 use crate::mesh::Mesh;
@@ -34,23 +35,23 @@ const WIDEST_LOBE: f64 = 1.0;
 const WIDEST: usize = 64;
 
 /// Whether each pixel of the view may be spoilt.
-pub(super) fn highlights(view: &View, mesh: &Mesh) -> Vec<bool> {
-    let none = vec![false; view.picture.levels.len()];
-    let Some((limit, deviation)) = limit(view, mesh) else { return none };
+pub(super) fn highlights<'p>(pool: &'p Pool, view: &View<'p>, mesh: &Mesh) -> Lent<'p, bool> {
+    let none = pool.flags.filled(false, view.picture.levels.len());
+    let Some((limit, deviation)) = limit(pool, view, mesh) else { return none };
     if limit >= FULL {
         return none;
     }
     let least = (limit + BRIGHTER[0].max(BRIGHTER[1] * deviation)).min(FULL);
     let smooth = view.picture.blurred(&view.core, BLUR);
     let shines = |(level, core): (&f64, &f64)| *level >= least && *core > 0.0;
-    let cores: Vec<bool> = smooth.levels.iter().zip(&view.core).map(shines).collect();
-    let mut spoilt = widened(&cores, view.picture.frame);
-    spread_by_normals(&cores, view, mesh, &mut spoilt);
+    let cores = pool.flags.of(smooth.levels.iter().zip(view.core.iter()).map(shines));
+    let mut spoilt = widened(pool, &cores, view.picture.frame);
+    spread_by_normals(pool, &cores, view, mesh, &mut spoilt);
     spoilt
 }
 
 /// Adds the pixels whose normals lie around those of the cores.
-fn spread_by_normals(cores: &[bool], view: &View, mesh: &Mesh, spoilt: &mut [bool]) {
+fn spread_by_normals(pool: &Pool, cores: &[bool], view: &View<'_>, mesh: &Mesh, spoilt: &mut [bool]) {
     let normal = |place: usize| {
         let face = view.depths.face[place];
         (face != NOTHING).then(|| mesh.area_normal(face as usize).normalize())
@@ -61,8 +62,8 @@ fn spread_by_normals(cores: &[bool], view: &View, mesh: &Mesh, spoilt: &mut [boo
         return;
     }
     let middle = middle.normalize();
-    let mut angles: Vec<f64> =
-        shining().map(|normal| libm::acos(normal.dot(&middle).clamp(-1.0, 1.0))).collect();
+    let angle = |normal: Vector3<f64>| libm::acos(normal.dot(&middle).clamp(-1.0, 1.0));
+    let mut angles = pool.numbers.of(shining().map(angle));
     let rank = angles.len() * MOST / 100;
     let (_, &mut core, _) = angles.select_nth_unstable_by(rank, f64::total_cmp);
     let least = libm::cos((LOBE * core).min(WIDEST_LOBE));
@@ -73,15 +74,14 @@ fn spread_by_normals(cores: &[bool], view: &View, mesh: &Mesh, spoilt: &mut [boo
 
 /// The brightest that a dull surface of this object would be, and the standard deviation from that law; none where too
 /// few pixels tell it.
-fn limit(view: &View, mesh: &Mesh) -> Option<(f64, f64)> {
+fn limit(pool: &Pool, view: &View<'_>, mesh: &Mesh) -> Option<(f64, f64)> {
     let seen = |(place, [u, v]): (usize, [i32; 2])| {
         let (face, level) = (view.depths.face[place], view.picture.levels[place]);
         let plain = u % EVERY == 0 && v % EVERY == 0 && face != NOTHING;
         let normal = || mesh.area_normal(face as usize).normalize();
         (plain && level < FULL && view.rim.levels[place] >= 3.0).then(|| (normal().push(1.0), level))
     };
-    let samples: Vec<(Vector4<f64>, f64)> =
-        view.picture.frame.pixels().enumerate().filter_map(seen).collect();
+    let samples = pool.samples.of(view.picture.frame.pixels().enumerate().filter_map(seen));
     if samples.len() < FEWEST {
         return None;
     }
@@ -90,21 +90,23 @@ fn limit(view: &View, mesh: &Mesh) -> Option<(f64, f64)> {
     for _ in 0..ROUNDS {
         let mut normal = Matrix4::identity() * 1e-3;
         let mut right = Vector4::zeros();
-        for (direction, level) in &samples {
+        for (direction, level) in samples.iter() {
             let weight = 1.0 / (1.0 + ((level - law.dot(direction)) / (2.0 * deviation)).powi(2));
             normal += weight * direction * direction.transpose();
             right += weight * *level * direction;
         }
         law = normal.cholesky()?.solve(&right);
-        deviation = spread(samples.iter().map(|(direction, level)| level - law.dot(direction))).max(1.0);
+        deviation =
+            spread(&pool.numbers, samples.iter().map(|(direction, level)| level - law.dot(direction)))
+                .max(1.0);
     }
     Some((law.w + law.xyz().norm(), deviation))
 }
 
 /// Each core, and around each disc that fits into it one of twice the radius.
-fn widened(cores: &[bool], frame: Frame) -> Vec<bool> {
-    let depth = rim(cores, frame.width, WIDEST);
-    let mut spoilt = cores.to_vec();
+fn widened<'p>(pool: &'p Pool, cores: &[bool], frame: Frame) -> Lent<'p, bool> {
+    let depth = rim(&pool.numbers, cores, frame.width, WIDEST);
+    let mut spoilt = pool.flags.of(cores.iter().copied());
     for (place, [u, v]) in frame.pixels().enumerate().filter(|(place, _)| cores[*place]) {
         let at = |du, dv| frame.place(u + du, v + dv).map_or(0.0, |place| depth[place]);
         if [(-1, 0), (1, 0), (0, -1), (0, 1)].iter().any(|&(du, dv)| at(du, dv) > depth[place]) {

@@ -5,28 +5,34 @@
 //!   that the rim is not darkened; levels go on beyond the mask as far as the Gaussian reaches.
 //! * **Cost**: the frame, times the Gaussian's length.
 
+use super::pool::Lent;
 use super::raster::Frame;
 use super::system::add;
 
 /// Grey levels in a frame, row by row.
-#[derive(Clone, Debug)]
-pub(super) struct Picture {
+#[derive(Debug)]
+pub(super) struct Picture<'p> {
     pub(super) frame: Frame,
-    pub(super) levels: Vec<f64>,
+    pub(super) levels: Lent<'p, f64>,
 }
 
-impl Picture {
+impl<'p> Picture<'p> {
     /// The picture seen through a Gaussian of `sigma` px, with the weights of `mask`, one a pixel.
     pub(super) fn blurred(&self, mask: &[f64], sigma: f64) -> Self {
+        let (frame, shelf) = (self.frame, self.levels.shelf());
         let reach = (3.0 * sigma).ceil() as usize;
-        let weights: Vec<f64> = (0..=reach).map(|x| libm::exp(-0.5 * (x as f64 / sigma).powi(2))).collect();
-        let blur = |values: Vec<f64>| {
-            along_rows(&along_columns(&values, self.frame, &weights), self.frame, &weights)
+        let weights = shelf.of((0..=reach).map(|x| libm::exp(-0.5 * (x as f64 / sigma).powi(2))));
+        let blur = |mut values: Lent<'p, f64>| {
+            let mut sums = shelf.filled(0.0, values.len());
+            along_columns(&values, frame, &weights, &mut sums);
+            values.fill(0.0);
+            along_rows(&sums, frame, &weights, &mut values);
+            values
         };
-        let levels = blur(self.levels.iter().zip(mask).map(|(level, weight)| level * weight).collect());
-        let total = blur(mask.to_vec());
-        let level = |(level, total): (&f64, &f64)| level / total.max(1e-3);
-        Self { frame: self.frame, levels: levels.iter().zip(&total).map(level).collect() }
+        let mut levels = blur(shelf.of(self.levels.iter().zip(mask).map(|(level, weight)| level * weight)));
+        let total = blur(shelf.of(mask.iter().copied()));
+        levels.iter_mut().zip(total.iter()).for_each(|(level, total)| *level /= total.max(1e-3));
+        Self { frame, levels }
     }
 
     /// The level at a place, bilinear; beyond the frame that of its border.
@@ -44,9 +50,9 @@ impl Picture {
     }
 }
 
-/// Convolution along rows with a symmetric kernel, of which `weights` has the middle and one side; zero outside.
-fn along_rows(values: &[f64], frame: Frame, weights: &[f64]) -> Vec<f64> {
-    let mut sums = vec![0.0; values.len()];
+/// Adds to `sums` the convolution along rows with a symmetric kernel, of which `weights` has the middle and one side;
+/// zero outside.
+fn along_rows(values: &[f64], frame: Frame, weights: &[f64], sums: &mut [f64]) {
     for (row, sums) in values.chunks(frame.width).zip(sums.chunks_mut(frame.width)) {
         add(sums, row, weights[0]);
         for (k, &weight) in weights.iter().enumerate().skip(1).take(frame.width.saturating_sub(1)) {
@@ -55,17 +61,14 @@ fn along_rows(values: &[f64], frame: Frame, weights: &[f64]) -> Vec<f64> {
             add(&mut sums[k..], &row[..within], weight);
         }
     }
-    sums
 }
 
 /// The same along columns.
-fn along_columns(values: &[f64], frame: Frame, weights: &[f64]) -> Vec<f64> {
-    let mut sums = vec![0.0; values.len()];
-    add(&mut sums, values, weights[0]);
+fn along_columns(values: &[f64], frame: Frame, weights: &[f64], sums: &mut [f64]) {
+    add(sums, values, weights[0]);
     for (k, &weight) in weights.iter().enumerate().skip(1).take(frame.height.saturating_sub(1)) {
         let (by, within) = (k * frame.width, (frame.height - k) * frame.width);
         add(&mut sums[..within], &values[by..], weight);
         add(&mut sums[by..], &values[..within], weight);
     }
-    sums
 }

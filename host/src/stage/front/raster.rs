@@ -6,6 +6,7 @@
 //! * **Meaning**: 1 / depth is linear over the image of a face, so depths are exact.
 //! * **Cost**: the pixels in the boxes around all faces, twice.
 
+use super::pool::{Lent, Pool};
 use crate::mesh::Mesh;
 
 /// A box of pixels.
@@ -28,7 +29,7 @@ impl Frame {
     /// Its pixels row by row.
     pub(super) fn pixels(&self) -> impl Iterator<Item = [i32; 2]> + use<> {
         let Self { corner: [u, v], width, height } = *self;
-        (0..height as i32).flat_map(move |y| (0..width as i32).map(move |x| [u + x, v + y]))
+        (0..width * height).map(move |place| [u + (place % width) as i32, v + (place / width) as i32])
     }
 }
 
@@ -36,23 +37,23 @@ impl Frame {
 pub(super) const NOTHING: u32 = u32::MAX;
 
 /// The first stretch of each ray inside a mesh.
-#[derive(Clone, Debug)]
-pub(super) struct Depths {
+#[derive(Debug)]
+pub(super) struct Depths<'p> {
     pub(super) frame: Frame,
     /// Where it begins, mm; infinite where the mesh is not met.
-    pub(super) near: Vec<f64>,
+    pub(super) near: Lent<'p, f64>,
     /// Where it ends, mm.
-    pub(super) far: Vec<f64>,
+    pub(super) far: Lent<'p, f64>,
     /// The face where it begins, or [`NOTHING`].
-    pub(super) face: Vec<u32>,
+    pub(super) face: Lent<'p, u32>,
 }
 
-impl Depths {
+impl<'p> Depths<'p> {
     /// The depths of a mesh whose vertices are seen at `images`.
-    pub(super) fn of(mesh: &Mesh, images: &[[f64; 3]], frame: Frame) -> Self {
+    pub(super) fn of(pool: &'p Pool, mesh: &Mesh, images: &[[f64; 3]], frame: Frame) -> Self {
         let count = frame.width * frame.height;
-        let (mut near, mut far, mut face) =
-            (vec![0.0_f64; count], vec![0.0_f64; count], vec![NOTHING; count]);
+        let [mut near, mut far] = [(); 2].map(|()| pool.numbers.filled(0.0, count));
+        let mut face = pool.faces.filled(NOTHING, count);
         let corners = |k: usize| mesh.faces[k].map(|vertex| images[vertex as usize]);
         let faces = || (0..mesh.faces.len()).map(|k| (k, corners(k)));
         // Rows run downwards, so a face that looks at the eye turns the other way in the image.
@@ -70,7 +71,7 @@ impl Depths {
                 }
             });
         }
-        for (near, far) in near.iter_mut().zip(&mut far) {
+        for (near, far) in near.iter_mut().zip(far.iter_mut()) {
             *near = near.recip();
             *far = if *far > 0.0 { far.recip() } else { *near };
         }

@@ -11,6 +11,7 @@
 use super::field::Scene;
 use super::lattice::Lattice;
 use super::picture::Picture;
+use super::pool::{Lent, Shelf};
 use super::raster::{Depths, NOTHING};
 use nalgebra::{Matrix3, Vector3};
 
@@ -26,20 +27,20 @@ const SLOPE: f64 = 0.75;
 pub(super) const FULL: f64 = 252.0;
 
 /// What one eye sees.
-#[derive(Clone, Debug)]
-pub(super) struct View {
+#[derive(Debug)]
+pub(super) struct View<'p> {
     /// The image as it is.
-    pub(super) picture: Picture,
+    pub(super) picture: Picture<'p>,
     /// The ball model's depths in it.
-    pub(super) depths: Depths,
+    pub(super) depths: Depths<'p>,
     /// 1 where a pixel and its neighbours are the object's, else 0: the weights of a blur.
-    pub(super) core: Vec<f64>,
+    pub(super) core: Lent<'p, f64>,
     /// Distance to the outline, px.
-    pub(super) rim: Picture,
+    pub(super) rim: Picture<'p>,
     /// 1 where the sensor was full, else 0.
-    pub(super) full: Picture,
+    pub(super) full: Picture<'p>,
     /// 1 where a highlight may spoil what is seen, else 0; 0 everywhere unless they were looked for.
-    pub(super) shines: Picture,
+    pub(super) shines: Picture<'p>,
 }
 
 /// How the right image answers the left one.
@@ -80,7 +81,7 @@ impl Seen {
 }
 
 /// The nodes that both eyes see on the ball model.
-pub(super) fn visible(lattice: &Lattice, scene: &Scene<'_>) -> Vec<usize> {
+pub(super) fn visible<'p>(lattice: &Lattice<'p>, scene: &Scene<'_, 'p>) -> Lent<'p, usize> {
     let Scene { mesh, views: [left, right], camera, .. } = scene;
     let pixel = |x: f64| x.round() as i32;
     let sees = |&node: &usize| {
@@ -98,19 +99,19 @@ pub(super) fn visible(lattice: &Lattice, scene: &Scene<'_>) -> Vec<usize> {
         let normal = mesh.area_normal(face as usize);
         -normal.dot(&to_right) > SLANTED * normal.norm() * to_right.norm()
     };
-    lattice.nodes().filter(sees).collect()
+    scene.pool.places.of(lattice.nodes().filter(sees))
 }
 
 /// Look nodes up in both images, where displacements put them.
-pub(super) fn look(
-    lattice: &Lattice,
+pub(super) fn look<'p>(
+    lattice: &Lattice<'p>,
     visible: &[usize],
-    [left, right]: &[Picture; 2],
-    scene: &Scene<'_>,
+    [left, right]: &[Picture<'p>; 2],
+    scene: &Scene<'_, 'p>,
     (moved, response): (&[f64], &Response),
-) -> Vec<Seen> {
+) -> Lent<'p, Seen> {
     let Scene { views, camera, .. } = scene;
-    let spoilt = |view: &View, u: f64, v: f64| view.full.at(u, v) > 0.1 || view.shines.at(u, v) > 0.1;
+    let spoilt = |view: &View<'_>, u: f64, v: f64| view.full.at(u, v) > 0.1 || view.shines.at(u, v) > 0.1;
     let seen = |&node: &usize| {
         let [u, v] = lattice.at[node];
         let depth = lattice.depth[node] * libm::exp(moved[node] * lattice.unit[node]);
@@ -127,7 +128,7 @@ pub(super) fn look(
             counts: inside && !spoilt(&views[0], u, v) && !spoilt(&views[1], column, row),
         }
     };
-    visible.iter().map(seen).collect()
+    scene.pool.seen.of(visible.iter().map(seen))
 }
 
 /// Rounds of reweighting.
@@ -140,13 +141,13 @@ const MOST_ROWS: [f64; 2] = [0.1, 0.75];
 const FIRM: [f64; 3] = [100.0, 1.0, 50.0];
 
 /// The response that explains most of what was seen, from one near it.
-pub(super) fn respond(seen: &[Seen], from: Response, known_rows: f64) -> Response {
+pub(super) fn respond(shelf: &Shelf<f64>, seen: &[Seen], from: Response, known_rows: f64) -> Response {
     let used = || seen.iter().filter(|seen| seen.counts);
     let mut best = from;
     let mut moved = 0.0;
     for _ in 0..ROUNDS {
         let model = |seen: &Seen| seen.left - best.gain * (seen.right + moved * seen.slopes[1]) - best.offset;
-        let scale = 2.0 * spread(used().map(model)).max(0.3);
+        let scale = 2.0 * spread(shelf, used().map(model)).max(0.3);
         let mut normal = Matrix3::from_diagonal(&FIRM.into());
         let mut right = Vector3::new(FIRM[0], 0.0, 0.0);
         for seen in used() {
@@ -166,8 +167,8 @@ pub(super) fn respond(seen: &[Seen], from: Response, known_rows: f64) -> Respons
 }
 
 /// The standard deviation of values around 0, by the median of their sizes; 0 without any.
-pub(super) fn spread(values: impl Iterator<Item = f64>) -> f64 {
-    let mut sizes: Vec<f64> = values.map(f64::abs).collect();
+pub(super) fn spread(shelf: &Shelf<f64>, values: impl Iterator<Item = f64>) -> f64 {
+    let mut sizes = shelf.of(values.map(f64::abs));
     if sizes.is_empty() {
         return 0.0;
     }

@@ -9,6 +9,8 @@
 //!   settled on coarser lattices, so that few turns are left for the finest (decisions/0023).
 //! * **Cost**: 13 multiplications a node and turn. Sequential: the same bits for any number of threads.
 
+use super::pool::{Lent, Shelf};
+
 /// Margin of a lattice on each side, nodes: as far as a stencil reaches.
 pub(super) const MARGIN: usize = 2;
 
@@ -21,20 +23,20 @@ const TOLERANCE: f64 = 0.03;
 const TURNS: usize = 40;
 
 /// Symmetric equations.
-#[derive(Clone, Debug)]
-pub(super) struct System {
+#[derive(Debug)]
+pub(super) struct System<'p> {
     offsets: [usize; BANDS],
-    diagonal: Vec<f64>,
-    bands: [Vec<f64>; BANDS],
-    right: Vec<f64>,
+    diagonal: Lent<'p, f64>,
+    bands: [Lent<'p, f64>; BANDS],
+    right: Lent<'p, f64>,
     /// Nodes that are none of the margin.
     inner: std::ops::Range<usize>,
 }
 
-impl System {
+impl<'p> System<'p> {
     /// Equations without terms for rows of `width` nodes, margins included.
-    pub(super) fn new(width: usize, nodes: usize) -> Self {
-        let zeros = || vec![0.0; nodes];
+    pub(super) fn new(shelf: &'p Shelf<f64>, width: usize, nodes: usize) -> Self {
+        let zeros = || shelf.filled(0.0, nodes);
         Self {
             offsets: [1, 2, width - 1, width, width + 1, 2 * width],
             diagonal: zeros(),
@@ -97,11 +99,12 @@ impl System {
 
     /// Solve for x, from 0.
     pub(super) fn solve(&self, x: &mut [f64]) {
-        let scale: Vec<f64> = self.diagonal.iter().map(|&d| if d > 0.0 { d.recip() } else { 0.0 }).collect();
+        let shelf = self.right.shelf();
+        let scale = shelf.of(self.diagonal.iter().map(|&d| if d > 0.0 { d.recip() } else { 0.0 }));
         x.fill(0.0);
-        let mut residual = self.right.clone();
-        let mut along: Vec<f64> = residual.iter().zip(&scale).map(|(r, s)| r * s).collect();
-        let mut product = vec![0.0; x.len()];
+        let mut residual = shelf.of(self.right.iter().copied());
+        let mut along = shelf.of(residual.iter().zip(scale.iter()).map(|(r, s)| r * s));
+        let mut product = shelf.filled(0.0, x.len());
         let mut size = dot(&residual, &along);
         let enough = size * TOLERANCE * TOLERANCE;
         for _ in 0..TURNS {
@@ -112,13 +115,13 @@ impl System {
             let step = size / dot(&along, &product);
             add(x, &along, step);
             add(&mut residual, &product, -step);
-            for ((product, residual), scale) in product.iter_mut().zip(&residual).zip(&scale) {
+            for ((product, residual), scale) in product.iter_mut().zip(residual.iter()).zip(scale.iter()) {
                 *product = residual * scale;
             }
             let before = size;
             size = dot(&residual, &product);
             let keep = size / before;
-            for (along, product) in along.iter_mut().zip(&product) {
+            for (along, product) in along.iter_mut().zip(product.iter()) {
                 *along = product + keep * *along;
             }
         }

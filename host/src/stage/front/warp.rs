@@ -8,6 +8,7 @@
 //!   shrinks, faces may cross, and vertices of the back move a little.
 
 use super::lattice::mean_near;
+use super::pool::{Lent, Shelf};
 use super::raster::Depths;
 use crate::mesh::Mesh;
 use nalgebra::Point3;
@@ -17,12 +18,13 @@ const LEFT: f64 = 0.05;
 
 /// Move the vertices, whose images are `images`, by `change` of ln depth at a place of the left image. Returns how
 /// far behind the front each lies: 0 there, 1 where the stretch ends and beyond.
-pub(super) fn warp(
+pub(super) fn warp<'p>(
+    shelf: &'p Shelf<f64>,
     mesh: &mut Mesh,
     images: &[[f64; 3]],
-    depths: &Depths,
+    depths: &Depths<'_>,
     change: impl Fn([f64; 2]) -> f64,
-) -> Vec<f64> {
+) -> Lent<'p, f64> {
     let size = [depths.frame.width, depths.frame.height];
     let mut moved = |(vertex, &[u, v, _]): (&mut Point3<f64>, &[f64; 3])| {
         let place = [u - f64::from(depths.frame.corner[0]), v - f64::from(depths.frame.corner[1])];
@@ -35,5 +37,5 @@ pub(super) fn warp(
         *vertex *= 1.0 + front * (1.0 - behind) / vertex.z;
         behind
     };
-    mesh.vertices.iter_mut().zip(images).map(&mut moved).collect()
+    shelf.of(mesh.vertices.iter_mut().zip(images).map(&mut moved))
 }

@@ -41,10 +41,22 @@ impl Rectification {
     /// images are beyond what a device takes.
     pub fn device_images(&self, left: GrayImage, right: GrayImage) -> Result<[GrayImage; 2], RectifyError> {
         self.check_sizes([&left, &right])?;
-        match self.model().mappings()? {
-            None => Ok([left, right]),
-            Some([to_left, to_right]) => Ok([warped(&to_left, &left)?, warped(&to_right, &right)?]),
-        }
+        device_images(&self.model(), [left, right])
+    }
+}
+
+/// The images of a device's rectified pair, left and right, as it makes them of the raw ones.
+///
+/// # Errors
+///
+/// [`RectifyError::Device`] or [`RectifyError::Capacity`] when the pair or its images are beyond what a device takes.
+pub fn device_images(
+    model: &PairModel,
+    [left, right]: [GrayImage; 2],
+) -> Result<[GrayImage; 2], RectifyError> {
+    match model.mappings()? {
+        None => Ok([left, right]),
+        Some([to_left, to_right]) => Ok([warped(&to_left, &left)?, warped(&to_right, &right)?]),
     }
 }
 
