@@ -1,4 +1,4 @@
-//! What a device is told of how to look: by flags at first, and then by the page.
+//! What a device is told of how to look: by flags at first, and then by those who look on.
 
 use super::Args;
 use super::desk::Desk;
@@ -16,31 +16,46 @@ pub(super) struct Orders {
     kept: [Option<ToDevice>; ORDERS.len()],
     /// What of the page the device was told.
     settings: Settings,
+    /// Whether it takes pairs.
+    runs: bool,
 }
 
 impl Orders {
-    /// What the flags say, and with a page all that it shows as set.
-    pub(super) fn new(args: &Args, settings: Settings) -> Self {
-        let shown = args.view.is_wanted();
+    /// What the flags say, and all that is shown to others as set.
+    pub(super) fn new(args: &Args, settings: Settings, shown: bool) -> Self {
         let threshold = args.threshold.or_else(|| shown.then_some(settings.threshold));
         let polarity = args.polarity.or_else(|| shown.then_some(settings.polarity));
-        Self { kept: [threshold.map(ToDevice::Threshold), polarity.map(ToDevice::Polarity), None], settings }
+        let kept = [threshold.map(ToDevice::Threshold), polarity.map(ToDevice::Polarity), None];
+        Self { kept, settings, runs: false }
     }
 
     /// Has a device that was greeted begin.
-    pub(super) fn start(&self, session: &mut Session, desk: &mut Desk<'_>) -> Result<(), SessionError> {
+    pub(super) fn start(&mut self, session: &mut Session, desk: &mut Desk<'_>) -> Result<(), SessionError> {
         for (which, order) in self.kept.iter().enumerate() {
             if let Some(order) = order {
                 desk.give(session, which, order)?;
             }
         }
-        session.order_cameras(&ToDevice::Start)
+        self.runs = false;
+        self.run(desk.audience.control.as_ref().is_none_or(|control| control.wants_pairs()), session)
     }
 
-    /// Passes on what was changed on the page.
+    /// Has the device take pairs, or none.
+    fn run(&mut self, runs: bool, session: &mut Session) -> Result<(), SessionError> {
+        match (self.runs, runs) {
+            (false, true) => session.order_cameras(&ToDevice::Start)?,
+            (true, false) => session.order(&ToDevice::Stop)?,
+            _ => {}
+        }
+        self.runs = runs;
+        Ok(())
+    }
+
+    /// Passes on what was changed by those who look on.
     pub(super) fn follow(&mut self, session: &mut Session, desk: &mut Desk<'_>) -> Result<(), SessionError> {
-        let Some(view) = &desk.view else { return Ok(()) };
-        let ((settings, _), before) = (view.control().settings(), self.settings);
+        let Some(control) = &desk.audience.control else { return Ok(()) };
+        let ((settings, _), before) = (control.settings(), self.settings);
+        let wanted = control.wants_pairs();
         let exposure = settings.exposure.filter(|_| settings.exposure != before.exposure);
         let exposure = exposure.map(|exposure| match exposure {
             Exposure::Auto => ExposureSetting::Auto,
@@ -63,6 +78,6 @@ impl Orders {
         }
         // Not before: what a device did not hear, because it was lost, it is told when it is back.
         self.settings = settings;
-        Ok(())
+        self.run(wanted, session)
     }
 }
