@@ -79,7 +79,7 @@ enum Action {
         value: String,
     },
     /// Be where everybody meets, until Ctrl-C
-    #[command(after_help = "Examples:\n  host fleet router --listen tcp/127.0.0.1:7447")]
+    #[command(after_help = "Examples:\n  host fleet router --listen-at tcp/127.0.0.1:7447")]
     Router,
 }
 

@@ -42,7 +42,7 @@ pub(super) struct MeetingArgs {
     connect: Vec<String>,
     /// Be the router at which the fleet meets
     #[arg(long, global = true, value_name = "tcp/HOST:PORT")]
-    listen: Vec<String>,
+    listen_at: Vec<String>,
     /// Zenoh's own configuration: certificates, access control
     #[arg(long, global = true, value_name = "FILE")]
     zenoh_config: Option<PathBuf>,
@@ -50,8 +50,8 @@ pub(super) struct MeetingArgs {
 
 impl MeetingArgs {
     pub(super) fn meeting(&self) -> Meeting {
-        let Self { connect, listen, zenoh_config } = self.clone();
-        Meeting { connect, listen, config: zenoh_config }
+        let Self { connect, listen_at, zenoh_config } = self.clone();
+        Meeting { connect, listen: listen_at, config: zenoh_config }
     }
 }
 

@@ -9,13 +9,13 @@
 //! its 64 places for messages are full. With --newest nobody waits, and the oldest of 16 are lost; --view without --out
 //! does the same.
 //!
-//! Everybody meets at a router: `host fleet router`, or whoever is given --listen. docs/fleet.md tells more. Needs a
+//! Everybody meets at a router: `host fleet router`, or whoever is given --listen-at. docs/fleet.md tells more. Needs a
 //! build with `--features fleet`.
 //!
 //! Examples:
 //!   host subscribe --out models
 //!   host subscribe 'ossature/lab/*' --view
-//!   host subscribe --listen tcp/127.0.0.1:7447 --models 100 --out models --json
+//!   host subscribe --listen-at tcp/127.0.0.1:7447 --models 100 --out models --json
 
 mod keep;
 mod look;

@@ -108,7 +108,7 @@ pub enum FleetError {
     },
     /// Nobody can be let in.
     #[error(
-        "cannot listen at {places}: {why}; another program may be there: give a free place with --listen"
+        "cannot listen at {places}: {why}; another program may be there: give a free place with --listen-at"
     )]
     Taken {
         /// Where.
