@@ -232,10 +232,9 @@ part_fleet() {
     tests cargo test -q --release --locked -p host --features batch,fleet --test batch --test fleet
     tests cargo test -q --release --locked -p host --features batch,fleet --lib -- batch:: fleet:: subscribe::
     check cargo build -q --release --locked -p host --features batch,fleet
-    # What the tests themselves are made of has no fleet, so it is not built anew.
-    OSSATURE_HOST=$(mktemp) && cp target/release/host "$OSSATURE_HOST" && export OSSATURE_HOST
-    tests cargo test -q --release --locked -p system-tests --test fleet -- --ignored --nocapture
-    rm -f "$OSSATURE_HOST"
+    # What the boards are made of has no fleet, so it is not built anew.
+    OSSATURE_HOST=$PWD/target/release/host \
+        tests cargo test -q --release --locked -p system-tests --test fleet -- --ignored
 }
 
 # Third-party code: licences, duplicates and sources (deny.toml), and what each package is made of, as
