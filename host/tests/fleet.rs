@@ -149,6 +149,44 @@ fn what_a_slow_subscriber_loses_is_counted_and_named() {
     }
 }
 
+/// What a pair takes on its way: 1.4 KB, 1 MiB and a line, as `host listen` sends them, to one subscriber that keeps up.
+#[test]
+#[ignore = "takes an idle machine"]
+fn how_fast_it_is() {
+    const PAIRS: u64 = 300;
+    let (router, client) = meet();
+    let mut publisher = client.publish(&board("left"), Pressure::Wait, control()).unwrap();
+    let subscriber = router.subscribe(&"ossature/*/*".parse().unwrap(), Pressure::Wait).unwrap();
+    warm(&mut publisher, &subscriber);
+    let begun = (Instant::now(), processor_time());
+    let sender = thread::spawn(move || {
+        for pair in 1..=PAIRS {
+            for (leaf, length) in [(Leaf::Shape, 1400), (Leaf::Model, MODEL), (Leaf::Pair, 300)] {
+                publisher.put(leaf, pair, vec![0; length]).unwrap();
+            }
+        }
+        publisher
+    });
+    loop {
+        let Message { leaf, envelope, .. } = next(&subscriber);
+        if leaf == Leaf::Pair && envelope.pair == PAIRS {
+            break;
+        }
+    }
+    let (wall, busy) = (begun.0.elapsed().as_secs_f64(), processor_time() - begun.1);
+    drop(sender.join().unwrap());
+    let per_pair = |seconds: f64| 1e3 * seconds / PAIRS as f64;
+    eprintln!("a pair: {:.2} ms, {:.2} ms of processors at both ends", per_pair(wall), per_pair(busy));
+}
+
+/// Of this process so far, s.
+fn processor_time() -> f64 {
+    let stat = fs::read_to_string("/proc/self/stat").unwrap();
+    let fields: Vec<&str> = stat.rsplit_once(')').unwrap().1.split_whitespace().collect();
+    // Ticks of 10 ms, of the program and of the system for it.
+    [11, 12].iter().map(|&k| fields[k].parse::<f64>().unwrap()).sum::<f64>() / 100.0
+}
+
 #[test]
 fn a_publisher_that_begins_anew_has_lost_nothing() {
     let (router, client) = meet();

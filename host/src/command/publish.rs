@@ -121,8 +121,8 @@ impl Voice {
 
     /// A board is gone.
     pub(super) fn gone(&mut self, why: &str, counters: Value) {
-        (self.away, self.told) = (Some(why.to_owned()), None);
-        self.status(counters);
+        self.away = Some(why.to_owned());
+        self.end(counters);
     }
 
     /// What the pixels of its shapes mean.
@@ -161,6 +161,12 @@ impl Voice {
     pub(super) fn health(&mut self, health: &Value) {
         self.heard = Instant::now();
         self.put(Leaf::Health, health.to_string().into_bytes());
+    }
+
+    /// That is all, for now at least.
+    pub(super) fn end(&mut self, counters: Value) {
+        self.told = None;
+        self.status(counters);
     }
 
     /// How its pairs fare, every now and then.

@@ -22,43 +22,71 @@ pub struct Publisher(Infallible);
 #[derive(Debug)]
 pub struct Subscriber(Infallible);
 
-#[expect(clippy::missing_errors_doc, reason = "there is one error, that of `open`")]
-#[expect(missing_docs, reason = "they are those of the program with Zenoh")]
 impl Link {
+    /// Says how to get a program that can.
+    ///
+    /// # Errors
+    /// [`FleetError::Absent`], always.
     pub fn open(_: &Meeting) -> Result<Self, FleetError> {
         Err(FleetError::Absent)
     }
 
+    /// There is no link to publish through.
+    ///
+    /// # Errors
+    /// None.
     pub fn publish(&self, _: &Board, _: Pressure, _: Arc<Control>) -> Result<Publisher, FleetError> {
         match self.0 {}
     }
 
+    /// There is no link to hear through.
+    ///
+    /// # Errors
+    /// None.
     pub fn subscribe(&self, _: &Board, _: Pressure) -> Result<Subscriber, FleetError> {
         match self.0 {}
     }
 
+    /// There is no link to ask through.
+    ///
+    /// # Errors
+    /// None.
     pub fn last(&self, _: &Board, _: Leaf) -> Result<Vec<Message>, FleetError> {
         match self.0 {}
     }
 
+    /// There is no link to order through.
+    ///
+    /// # Errors
+    /// None.
     pub fn order(&self, _: &Board, _: &str, _: &str) -> Result<Vec<Obeyed>, FleetError> {
         match self.0 {}
     }
 }
 
-#[expect(missing_docs, reason = "they are those of the program with Zenoh")]
 impl Publisher {
+    /// There is nobody to send.
+    ///
+    /// # Errors
+    /// None.
     pub fn put(&mut self, _: Leaf, _: u64, _: Vec<u8>) -> Result<(), FleetError> {
         match self.0 {}
     }
 
+    /// There is nobody to send.
+    ///
+    /// # Errors
+    /// None.
     pub fn status(&mut self, _: u64, _: Map<String, Value>) -> Result<(), FleetError> {
         match self.0 {}
     }
 }
 
-#[expect(missing_docs, reason = "they are those of the program with Zenoh")]
 impl Subscriber {
+    /// There is nobody to hear.
+    ///
+    /// # Errors
+    /// None.
     pub fn next(&self, _: Duration) -> Result<Option<Result<Message, String>>, FleetError> {
         match self.0 {}
     }

@@ -165,6 +165,9 @@ impl<'a> Session<'a> {
         let (tally, result) =
             live::run(&mut rig.pairs, &rig.optics, stop, |live, tally| self.take(live, tally));
         self.bar.finish_and_clear();
+        if let Some(voice) = &mut self.voice {
+            voice.end(json!({ "dropped": tally.dropped }));
+        }
         if let Some(view) = &self.view {
             view::tell_flags(view, &self.first);
         }

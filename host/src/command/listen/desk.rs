@@ -300,8 +300,11 @@ impl<'a> Desk<'a> {
         }
     }
 
-    pub(super) fn close(self, tally: &Tally) -> Result<(), Failure> {
+    pub(super) fn close(mut self, tally: &Tally) -> Result<(), Failure> {
         self.bar.finish_and_clear();
+        if let Some(voice) = &mut self.audience.voice {
+            voice.end(link_as_json(tally));
+        }
         if let Some(timings) = &self.timings {
             timings.tell();
         }
