@@ -29,7 +29,7 @@ use super::publish::MeetingArgs;
 use super::table::count;
 use super::{Failure, interruption, note, say, say_json, say_json_line};
 use crate::fleet::key::{Board, Leaf};
-use crate::fleet::{Link, MEETING_PLACE, Meeting};
+use crate::fleet::{Link, MEETING_PLACE, Meeting, printable};
 use roster::Roster;
 
 /// From one look at the boards to the next.
@@ -151,7 +151,7 @@ fn order(link: &Link, boards: &Board, (what, value): (&str, &str), json: bool) -
     if json {
         say_json(&json!({ "obeyed": obeyed, "refused": refused }))?;
     } else {
-        refused.iter().for_each(|why| note(&format!("refused: {why}")));
+        refused.iter().for_each(|why| note(&format!("refused: {}", printable(why))));
         if !obeyed.is_empty() {
             let number = count(obeyed.len(), "board obeys", "boards obey");
             say(&format!("{number}: {what} {value}\n"))?;

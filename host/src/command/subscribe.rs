@@ -33,7 +33,7 @@ use super::view::ViewArgs;
 use super::{Failure, interruption, note, say, say_json_line};
 use crate::fleet::key::{Board, Leaf};
 use crate::fleet::ledger::{Gap, Ledger};
-use crate::fleet::{Link, Message, Pressure};
+use crate::fleet::{Link, Message, Pressure, printable};
 use look::Looker;
 
 /// Longest that is waited for a message before time is looked at.
@@ -98,7 +98,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     while !is_over(desk.models) {
         match subscriber.next(LOOK)? {
             Some(Ok(message)) => desk.count(&message)?,
-            Some(Err(why)) => note(&why),
+            Some(Err(why)) => note(&printable(&why)),
             None => {}
         }
     }
@@ -153,7 +153,7 @@ impl Desk<'_> {
                 } else {
                     let became = told["error"]
                         .as_str()
-                        .map_or_else(|| "a model".into(), |why| format!("refused: {why}"));
+                        .map_or_else(|| "a model".into(), |why| format!("refused: {}", printable(why)));
                     say(&format!("{board}: pair {}: {became}\n", envelope.pair))
                 };
             }

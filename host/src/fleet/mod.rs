@@ -72,6 +72,12 @@ pub struct Message {
     pub bytes: Vec<u8>,
 }
 
+/// What others wrote, for a terminal: what would steer it is a question mark.
+#[must_use]
+pub fn printable(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() { '?' } else { c }).collect()
+}
+
 /// What was answered to an order: what is set now, as JSON, or why not, in a sentence.
 pub type Obeyed = Result<Vec<u8>, String>;
 

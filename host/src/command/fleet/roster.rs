@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 
 use crate::command::table::Table;
-use crate::fleet::Message;
 use crate::fleet::key::Board;
+use crate::fleet::{Message, printable};
 
 /// Silence after which a board that publishes is told to be silent.
 const SILENT: f64 = 30.0;
@@ -77,8 +77,10 @@ impl Entry {
         let (mut table, status) = (Table::new(&board.to_string()), &self.status);
         let about = &status["about"];
         match (self.firmware(), about["board"].as_str(), about["camera"].as_str()) {
-            (Some(firmware), Some(name), _) => table.row("firmware", &format!("{firmware} of {name}")),
-            (_, _, Some(camera)) => table.row("camera", camera),
+            (Some(firmware), Some(name), _) => {
+                table.row("firmware", &printable(&format!("{firmware} of {name}")))
+            }
+            (_, _, Some(camera)) => table.row("camera", &printable(camera)),
             _ => table.row("firmware", "not known"),
         }
         let rate = status["rate_hz"].as_f64().unwrap_or(0.0);
@@ -89,12 +91,12 @@ impl Entry {
         if !self.answers {
             table.warning("it does not answer any more: look whether its program runs");
         } else if let Some(why) = status["away"].as_str() {
-            table.warning(&format!("the device is gone: {why}"));
+            table.warning(&printable(&format!("the device is gone: {why}")));
         } else if seen > SILENT {
             table.warning("nothing is heard of it; look at its camera and cable");
         }
         for warning in status["warnings"].as_array().into_iter().flatten().filter_map(Value::as_str) {
-            table.warning(warning);
+            table.warning(&printable(warning));
         }
         table.text().to_owned()
     }
@@ -111,7 +113,7 @@ mod tests {
         let board = Board::one("ossature/lab/left").unwrap();
         let status = json!({
             "about": { "board": "bench", "firmware": "1.2.3" }, "heard_ms": 1500, "rate_hz": 2.5, "pairs": 7,
-            "models": 6, "warnings": ["it is dark"],
+            "models": 6, "warnings": ["it is \u{1b}[31mdark"],
         });
         let envelope = Envelope {
             contract: CONTRACT,
@@ -125,7 +127,8 @@ mod tests {
         let mut roster = Roster::default();
         roster.answered(vec![Message { board, leaf: Leaf::Status, envelope, bytes }]);
         let text = roster.as_text();
-        for words in ["1.2.3 of bench", "2.50 pairs a second", "2.0 s ago", "7, 6 with a model", "it is dark"]
+        for words in
+            ["1.2.3 of bench", "2.50 pairs a second", "2.0 s ago", "7, 6 with a model", "it is ?[31mdark"]
         {
             assert!(text.contains(words), "{words}: {text}");
         }
