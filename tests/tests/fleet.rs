@@ -168,6 +168,7 @@ fn every_model_of_four_boards_by_two_publishers_arrives_at_one_subscriber() {
     let (models, pairs) = ((4 * PAIRS).to_string(), PAIRS.to_string());
     let arguments = ["subscribe", "--out", &out, "--models", &models, "--seconds", "100", "--json"];
     let subscriber = listening(&place, &arguments);
+    assert_eq!(subscriber.json(PATIENCE).unwrap()["subscribed"], "ossature/*/*");
     let names = shapes.map(|shape| format!("ossature/lab/{}", shape.name()));
     let publishers = [0, 2].map(|k| {
         let mut arguments = vec!["listen", "--connect", &place, "--frames", &pairs, "--json"];
@@ -214,6 +215,7 @@ fn a_board_takes_orders_and_who_is_killed_is_missed_and_may_come_again() {
     let (place, name) = (place(), "ossature/lab/left");
     let _router = listening(&place, &["fleet", "router"]);
     let subscriber = Program::host(&["subscribe", "--connect", &place, "--json"]);
+    assert_eq!(subscriber.json(PATIENCE).unwrap()["subscribed"], "ossature/*/*");
     let start = || {
         Program::host(&["listen", "--port", port, "--calib", calib, "--publish", name, "--connect", &place])
     };

@@ -84,6 +84,12 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         ledger: Ledger::default(),
         models: 0,
     };
+    // Whoever waits for this program to be there can go on.
+    if args.json {
+        say_json_line(&json!({ "subscribed": args.boards.to_string() }))?;
+    } else {
+        note(&format!("hearing {}, until Ctrl-C", args.boards));
+    }
     // What boards said before this was there.
     for message in link.last(&args.boards, Leaf::Calibration)? {
         desk.take(&message)?;
