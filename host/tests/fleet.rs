@@ -346,14 +346,14 @@ fn who_has_no_certificate_is_not_let_in() {
         let text = names
             .iter()
             .fold(text, |text, name| text.replace(&format!("\"{name}"), &format!("{here}{name}")));
-        let path = ours.path().join(name);
+        let path = ours.path().join(format!("{name}.json5"));
         fs::write(&path, change(text)).unwrap();
         Meeting { config: Some(path), ..Meeting::default() }
     };
     let same = |text| text;
-    let router = Link::open(&config(router, "router.json5", &same)).unwrap();
+    let router = Link::open(&config(router, "router", &same)).unwrap();
     let subscriber = router.subscribe(&"ossature/*/*".parse().unwrap(), Pressure::Wait).unwrap();
-    let member_link = Link::open(&config(member, "board.json5", &same)).unwrap();
+    let member_link = Link::open(&config(member, "board", &same)).unwrap();
     let mut publisher = member_link.publish(&board("left"), Pressure::Wait, control()).unwrap();
     warm(&mut publisher, &subscriber);
 

@@ -39,8 +39,14 @@ const OURS: [(&str, &str); 3] = [
     ("transport/link/rx/max_message_size", "67108864"),
 ];
 
-fn failed(error: impl ToString) -> FleetError {
-    FleetError::Link(error.to_string())
+fn failed(error: zenoh::Error) -> FleetError {
+    FleetError::Link(words(&error))
+}
+
+/// What Zenoh says, without where in its source it says so.
+fn words(error: &zenoh::Error) -> String {
+    let words = error.to_string();
+    words.split(" at /").next().unwrap_or_default().trim_end_matches(['!', ' ']).to_owned()
 }
 
 /// A part of the network.
@@ -57,8 +63,7 @@ impl Link {
         zenoh::try_init_log_from_env();
         let (config, listens) = configuration(meeting)?;
         let session = zenoh::open(config).wait().map_err(|error| {
-            let (places, why) = (meeting.to_string(), error.to_string());
-            let why = why.split(" at ").next().unwrap_or_default().trim_end_matches(['!', ' ']).to_owned();
+            let (places, why) = (meeting.to_string(), words(&error));
             if listens { FleetError::Taken { places, why } } else { FleetError::Nobody { places, why } }
         })?;
         Ok(Self(session))
@@ -135,10 +140,10 @@ impl Link {
             None => question,
         };
         let answers = question.with(FifoChannel::new(ROOM)).wait().map_err(failed)?;
-        let words = |error: zenoh::query::ReplyError| {
+        let sentence = |error: zenoh::query::ReplyError| {
             String::from_utf8_lossy(&error.payload().to_bytes()).into_owned()
         };
-        Ok(answers.iter().map(|reply| reply.into_result().map_err(words)).collect())
+        Ok(answers.iter().map(|reply| reply.into_result().map_err(sentence)).collect())
     }
 }
 
@@ -147,7 +152,7 @@ fn configuration(meeting: &Meeting) -> Result<(Config, bool), FleetError> {
     let none = Path::new("");
     let wrong = |error: zenoh::Error| FleetError::Config {
         path: meeting.config.as_deref().unwrap_or(none).to_owned(),
-        why: error.to_string(),
+        why: words(&error),
     };
     let (defaults, mut config) = (
         Config::default(),
