@@ -86,9 +86,12 @@ fn slowly(pressures: [Pressure; 2], models: u64, pause: Duration) -> (Vec<u64>, 
         for pair in 1..=models {
             publisher.put(Leaf::Model, pair, vec![pair as u8; MODEL]).unwrap();
         }
-        // Room for what must come.
-        thread::sleep(Duration::from_secs(1));
-        publisher.status(models, Map::new()).unwrap();
+        // A status may be lost as well, so there are several, once there is somebody who looks.
+        thread::sleep(pause);
+        for _ in 0..20 {
+            thread::sleep(Duration::from_millis(250));
+            publisher.status(models, Map::new()).unwrap();
+        }
         publisher
     });
     thread::sleep(pause);
