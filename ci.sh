@@ -207,12 +207,34 @@ part_miri() {
         -- --skip long_division_is_division
 }
 
-# Pairs that machines make together: a queue's server, and workers that are killed.
+# A Python with Zenoh, as a foreign client.
+foreign_client() {
+    local venv=target/fleet-venv
+    if ! "$venv/bin/python" -c 'import zenoh' 2>/dev/null; then
+        need python3 python3 python3-venv
+        python3 -m venv "$venv" || { install python3-venv && python3 -m venv "$venv"; }
+        "$venv/bin/pip" install -q --disable-pip-version-check 'eclipse-zenoh>=1.10,<2'
+    fi
+    if ! "$venv/bin/python" -c 'import zenoh' 2>/dev/null; then
+        echo "SKIPPED: Python's Zenoh could not be installed: NO foreign client is tried"
+        [ "${CI:-}" != true ] || fail "in CI a foreign client must run"
+        return
+    fi
+    export OSSATURE_ZENOH_PYTHON=$PWD/$venv/bin/python
+}
+
+# Pairs that machines make together: a queue's server, and workers that are killed; and live boards, simulated.
 part_fleet() {
     need nats-server nats-server
-    check cargo clippy -q -p host --all-targets --features batch --locked -- -D warnings
-    tests cargo test -q --release --locked -p host --features batch --test batch
-    tests cargo test -q --release --locked -p host --features batch --lib batch::
+    need openssl openssl
+    foreign_client
+    check cargo clippy -q -p host --all-targets --features batch,fleet --locked -- -D warnings
+    tests cargo test -q --release --locked -p host --features batch,fleet --test batch --test fleet
+    tests cargo test -q --release --locked -p host --features batch,fleet --lib -- batch:: fleet:: subscribe::
+    check cargo build -q --release --locked -p host --features batch,fleet
+    # What the boards are made of has no fleet, so it is not built anew.
+    OSSATURE_HOST=$PWD/target/release/host \
+        tests cargo test -q --release --locked -p system-tests --test fleet -- --ignored
 }
 
 # Third-party code: licences, duplicates and sources (deny.toml), and what each package is made of, as

@@ -42,6 +42,7 @@ pub mod report;
 pub mod output;
 mod unfinished;
 pub mod live;
+pub mod fleet;
 
 // Many pairs on many machines.
 #[cfg(feature = "batch")]

@@ -35,8 +35,24 @@ pub(crate) const PICTURES: &str = "pictures";
 const REPORT: &str = "report.json";
 /// The page.
 const PAGE: &str = "report.html";
+/// What surfaces and curves say of themselves.
+const COMMENTS: [&str; 3] = ["Ossature", "unit mm", "axes of the left camera: x right, y down, z forward"];
 /// Bytes of a page among which its mark is.
 const HEAD: u64 = 1024;
+
+/// What is known at each vertex of a surface.
+fn known(made: &Reconstruction) -> Option<(&'static str, &[f64])> {
+    made.front.as_ref().map(|front| ("confidence", &front.confidence[..]))
+}
+
+/// The bytes of `model.ply`.
+#[must_use]
+pub fn surface(made: &Reconstruction) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    // There is always room in memory.
+    let _ = ply::mesh_into(&mut bytes, &made.mesh, known(made).as_slice(), &COMMENTS);
+    bytes
+}
 
 /// Write all files of a run into `folder`, which is created if it is missing, and a page if that is wanted;
 /// returns the report's text.
@@ -165,12 +181,10 @@ struct Stage<'a> {
 impl Stage<'_> {
     /// The surface, the skeleton and the boundary.
     fn models(&self, made: &Reconstruction) -> Result<Vec<String>, ExportError> {
-        let comments = ["Ossature", "unit mm", "axes of the left camera: x right, y down, z forward"];
-        let confidence = made.front.as_ref().map(|front| [("confidence", &front.confidence[..])]);
-        let known = confidence.as_ref().map_or(&[][..], |known| known);
-        self.named("model.ply", |path| ply::write_known_mesh(path, &made.mesh, known, &comments))?;
+        let known = known(made);
+        self.named("model.ply", |path| ply::write_known_mesh(path, &made.mesh, known.as_slice(), &COMMENTS))?;
         for (name, curves) in [("skeleton.ply", &made.skeleton), ("boundary.ply", &made.boundary)] {
-            self.named(name, |path| ply::write_curves(path, curves, &comments))?;
+            self.named(name, |path| ply::write_curves(path, curves, &COMMENTS))?;
         }
         Ok(["model.ply", "skeleton.ply", "boundary.ply"].map(String::from).to_vec())
     }

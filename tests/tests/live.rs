@@ -8,19 +8,16 @@
 use host::shape::Shape;
 use image::RgbImage;
 use oracle::browser::{Browser, Page, Sight};
-use oracle::camera::Time;
-use oracle::device::{Bench, Eyes, Page as Flash};
 use oracle::program::{host, within};
 use oracle::scene::{Scale, camera, pair, see, views};
+use oracle::socket::{intact, prepare, serve};
 use serde_json::{Value, json};
 use std::cell::RefCell;
 use std::fs;
 use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
 use std::net::TcpStream;
-use std::os::unix::net::UnixListener;
 use std::path::Path;
 use std::process::{Child, ChildStderr, Command, Stdio};
-use std::rc::Rc;
 use std::thread;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
@@ -467,33 +464,9 @@ fn how_fast_it_is_at_full_size() {
 
 /// A device behind a socket that has its calibration.
 fn device(folder: &Path) -> String {
-    let socket = within(folder, "device.socket");
-    let listener = UnixListener::bind(&socket).unwrap();
-    thread::spawn(move || {
-        let time = Time::default();
-        let (eyes, _) = Eyes::new(pair(Shape::Teapot, 2).map(image::GrayImage::into_raw), time.clone());
-        let mut bench = Bench::new(eyes, time, &Rc::new(RefCell::new(Flash::default())));
-        for stream in listener.incoming() {
-            let mut stream = stream.unwrap();
-            stream.set_read_timeout(Some(Duration::from_millis(1))).unwrap();
-            let mut buffer = [0; 512];
-            loop {
-                match stream.read(&mut buffer) {
-                    Ok(0) => break,
-                    Ok(count) => bench.cable.borrow_mut().to_device.extend(&buffer[..count]),
-                    Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
-                    Err(_) => break,
-                }
-                if !(0..50).all(|_| stream.write_all(&bench.carry().1).is_ok()) {
-                    break;
-                }
-            }
-        }
-    });
-    let calib = within(folder, "calib.yaml");
-    camera(2).write_opencv_yaml(&calib).unwrap();
-    host(&["device", "calibrate", &calib, "--port", &socket]).unwrap();
-    host(&["device", "expose", "300,1", "--port", &socket]).unwrap();
+    camera(2).write_opencv_yaml(folder.join("calib.yaml")).unwrap();
+    let socket = serve(folder, &pair(Shape::Teapot, 2), intact, usize::MAX);
+    prepare(folder, &socket);
     socket
 }
 

@@ -8,18 +8,15 @@ use host::source::serial::port::{Address, Port, PortError};
 use host::source::serial::recording::Recording;
 use host::source::serial::session::Session;
 use image::GrayImage;
-use oracle::camera::Time;
-use oracle::device::{Bench, Eyes, Page};
 use oracle::link;
 use oracle::program::{host, model, within};
 use oracle::scene::{Pair, bent_camera, camera, pair};
+use oracle::socket::{carry, device, intact, prepare, serve};
 use shared::wire::{Counters, Decoder, MAX_FRAME};
-use std::cell::RefCell;
 use std::fs;
 use std::io::{ErrorKind, Read, Write};
 use std::os::unix::net::UnixListener;
 use std::path::Path;
-use std::rc::Rc;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::thread;
@@ -39,13 +36,6 @@ fn scene() -> (TempDir, Pair) {
     (folder, pictures)
 }
 
-/// What a link does to bytes on their way to the host; how many went before.
-type Fault = fn(usize, Vec<u8>) -> Vec<u8>;
-
-fn intact(_: usize, bytes: Vec<u8>) -> Vec<u8> {
-    bytes
-}
-
 /// A line on which a frame takes some time, as half of one does on a board's.
 fn slow(_: usize, bytes: Vec<u8>) -> Vec<u8> {
     if !bytes.is_empty() {
@@ -54,64 +44,12 @@ fn slow(_: usize, bytes: Vec<u8>) -> Vec<u8> {
     bytes
 }
 
-/// Carry bytes between a device and a port until the port or `limit` bytes end.
-fn carry(bench: &mut Bench<Eyes>, port: &mut Port, fault: Fault, limit: usize) {
-    let (mut sent, mut buffer) = (0, [0; 512]);
-    while sent < limit {
-        match port.reader.read(&mut buffer) {
-            Ok(0) => return,
-            Ok(count) => bench.cable.borrow_mut().to_device.extend(&buffer[..count]),
-            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
-            Err(_) => return,
-        }
-        for _ in 0..50 {
-            let (_, bytes) = bench.carry();
-            let count = bytes.len();
-            if port.writer.write_all(&fault(sent, bytes)).is_err() {
-                return;
-            }
-            sent += count;
-        }
-    }
-}
-
-/// A device in its own thread.
-fn device(scenes: Pair) -> Bench<Eyes> {
-    let time = Time::default();
-    let (eyes, _) = Eyes::new(scenes.map(GrayImage::into_raw), time.clone());
-    Bench::new(eyes, time, &Rc::new(RefCell::new(Page::default())))
-}
-
-/// A device behind a socket, which hangs up once after so many bytes of its first connection.
-fn serve(folder: &Path, pictures: &Pair, fault: Fault, hang_up: usize) -> String {
-    let path = folder.join("device.socket");
-    let listener = UnixListener::bind(&path).unwrap();
-    let pictures = pictures.clone();
-    thread::spawn(move || {
-        let (mut bench, mut limit) = (device(pictures), hang_up);
-        for stream in listener.incoming() {
-            let stream = stream.unwrap();
-            stream.set_read_timeout(Some(Duration::from_millis(1))).unwrap();
-            let reader = Box::new(stream.try_clone().unwrap());
-            carry(&mut bench, &mut Port { reader, writer: Box::new(stream) }, fault, limit);
-            limit = usize::MAX;
-        }
-    });
-    path.display().to_string()
-}
-
 /// The report, but for its times.
 fn report(folder: &Path) -> serde_json::Value {
     let mut report: serde_json::Value =
         serde_json::from_slice(&fs::read(folder.join("report.json")).unwrap()).unwrap();
     report["times_ms"].take();
     report
-}
-
-/// Give the device its calibration and an exposure at which it sees the pictures as they are.
-fn prepare(folder: &Path, port: &str) {
-    host(&["device", "calibrate", &within(folder, "calib.yaml"), "--port", port]).unwrap();
-    host(&["device", "expose", "300,1", "--port", port]).unwrap();
 }
 
 /// Make the model of the pictures, without a device.

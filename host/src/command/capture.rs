@@ -19,6 +19,8 @@
 //! --view shows each pair on a page in the browser as it is made, where threshold, polarity, region and exposure can be
 //! set for the next one; models are then written only if --out is given. docs/live.md tells more.
 //!
+//! --publish tells a fleet of each pair and its model, and takes orders from it (docs/fleet.md).
+//!
 //! Succeeds if any pair gave a model (with --only-record: was recorded) and the camera did not fail.
 //! docs/capture.md tells more.
 //!
@@ -40,6 +42,7 @@ use clap::ValueEnum;
 use clap::builder::ArgPredicate;
 
 use super::options::{CameraArgs, MethodArgs, NoCalibration, SceneArgs, positive, usage};
+use super::publish::PublishArgs;
 use super::view::ViewArgs;
 use super::{Failure, interruption, note, told};
 use crate::reconstruct::Options;
@@ -103,21 +106,23 @@ pub struct Args {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     wait: Option<u32>,
     /// Make one model, of the best pair
-    #[arg(long, conflicts_with = "view")]
+    #[arg(long, conflicts_with_all = ["view", "publish"])]
     best: bool,
     /// Folder that keeps the pairs, new or empty
     #[arg(long, value_name = "DIR")]
     record: Option<PathBuf>,
     /// Make no models
-    #[arg(long, requires = "record", conflicts_with_all = ["best", "background", "roi", "view"])]
+    #[arg(long, requires = "record", conflicts_with_all = ["best", "background", "roi", "view", "publish"])]
     only_record: bool,
     #[command(flatten)]
     view: ViewArgs,
+    #[command(flatten)]
+    publish: PublishArgs,
     /// Folder for the results
     #[arg(
         long,
         value_name = "DIR",
-        default_value_if("view", ArgPredicate::IsPresent, None),
+        default_value_ifs([("view", ArgPredicate::IsPresent, None), ("publish", ArgPredicate::IsPresent, None)]),
         default_value = "ossature-capture"
     )]
     out: Option<PathBuf>,
@@ -182,7 +187,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     {
         return Err(usage("both devices are the same camera: give two, or one that sees with both eyes"));
     }
-    let mut options = Options { draft: args.out.is_none(), ..args.method.options()? };
+    if args.publish.boards().len() > 1 {
+        return Err(usage("one camera is one board: give --publish once"));
+    }
+    let draft = args.out.is_none() && !args.publish.is_wanted();
+    let mut options = Options { draft, ..args.method.options()? };
     let prepared = told(args.json, {
         let scene = args.scene.scene(None, args.swap, &mut options);
         scene.and_then(|scene| Ok((scene, open(args, layout)?, interruption()?)))
@@ -233,7 +242,11 @@ fn open(args: &Args, layout: Option<Layout>) -> Result<Rig<Kernel>, Failure> {
     let (layout, swap) = (choice.layout, args.swap);
     let cameras = || [Some(&first), second.as_ref()].into_iter().flatten();
     let formats = cameras().map(Kernel::format).collect();
-    let dials = if args.view.is_wanted() { cameras().filter_map(Kernel::dial).collect() } else { Vec::new() };
+    let dials = if args.view.is_wanted() || args.publish.is_wanted() {
+        cameras().filter_map(Kernel::dial).collect()
+    } else {
+        Vec::new()
+    };
     let optics = Optics { formats, layout, swap };
     let most = Duration::from_secs(args.wait.unwrap_or(0).into());
     let pairs = Pairs::of(first, second).waiting(Wait { most, tell: note });

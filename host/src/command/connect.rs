@@ -7,9 +7,10 @@ use std::time::Duration;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 use shared::camera::PairModel;
-use shared::wire::calibration_crc;
+use shared::wire::{Health, calibration_crc};
 
 use super::Failure;
+use super::options::usage;
 use super::table::count;
 use crate::calibration::StereoCamera;
 use crate::source::serial::inbox::Hello;
@@ -22,18 +23,32 @@ use crate::stage::rectify::Rectification;
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "Device")]
 pub(super) struct PortArgs {
-    /// Port of the device: a serial port, the path of a socket, or auto for the only one plugged in
+    /// Port of the device: a serial port, the path of a socket, or auto for the only one plugged in; `host listen` takes
+    /// several
     #[arg(long, global = true, value_name = "PATH|auto", default_value = "auto")]
-    port: Address,
+    port: Vec<Address>,
     /// Rate of a serial port with wires; USB has its own
     #[arg(long, global = true, value_name = "BAUD", default_value_t = 921_600, value_parser = clap::value_parser!(u32).range(300..))]
     baud: u32,
 }
 
 impl PortArgs {
-    /// Open the port and exchange hellos; what comes is recorded by `tap`.
-    pub(super) fn begin(&self, tap: Option<Tap>) -> Result<(Session, Hello), SessionError> {
-        let (port, baud) = (self.port.clone(), self.baud);
+    /// The ports.
+    pub(super) fn all(&self) -> &[Address] {
+        &self.port
+    }
+
+    /// The only port.
+    pub(super) fn only(&self) -> Result<&Address, Failure> {
+        match &self.port[..] {
+            [port] => Ok(port),
+            _ => Err(usage("this is done with one device at a time: give one --port")),
+        }
+    }
+
+    /// Open a port and exchange hellos; what comes is recorded by `tap`.
+    pub(super) fn begin(&self, port: &Address, tap: Option<Tap>) -> Result<(Session, Hello), SessionError> {
+        let (port, baud) = (port.clone(), self.baud);
         Session::begin(Box::new(move || port.open(baud)), tap)
     }
 }
@@ -125,6 +140,22 @@ pub(super) fn hello_as_json(hello: &Hello) -> Value {
         "most_control_points": hello.capacities.controls,
         "reset": reset(hello),
         "calibration_crc": hello.calibration.map(|crc| format!("{crc:08x}")),
+    })
+}
+
+/// How a device fares.
+pub(super) fn health_as_json(health: &Health) -> Value {
+    json!({
+        "uptime_ms": health.uptime,
+        "pairs": health.pairs,
+        "refused": health.refused,
+        "dropped": health.dropped,
+        "timeouts": health.timeouts,
+        "restarts": health.restarts,
+        "rejected_bytes": health.rejected_bytes,
+        "rejected_frames": health.rejected_frames,
+        "watchdog_resets": health.watchdog_resets,
+        "storage_faults": health.storage_faults,
     })
 }
 

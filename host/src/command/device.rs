@@ -21,7 +21,7 @@ use serde_json::{Value, json};
 use shared::stage::binarise::{Polarity, Threshold};
 use shared::wire::{Exposure, ExposureSetting, Health, PictureKind, ToDevice, calibration_crc};
 
-use super::connect::{PortArgs, check_calibration, hello_as_json, model_of, reset, version};
+use super::connect::{PortArgs, check_calibration, health_as_json, hello_as_json, model_of, reset, version};
 use super::table::Table;
 use super::{Failure, of_system, say, say_json, shown};
 use crate::output::{grey_png, write_together};
@@ -109,7 +109,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         Action::Calibrate { file } => Some(model_of(file)?),
         _ => None,
     };
-    let (mut session, hello) = args.port.begin(None)?;
+    let (mut session, hello) = args.port.begin(args.port.only()?, None)?;
     let (json, text) = match (&args.action, model) {
         (Action::Calibrate { .. }, Some(model)) => {
             session.order(&ToDevice::Calibration(model))?;
@@ -174,21 +174,7 @@ fn faults(health: &Health) -> [(&'static str, u32); 7] {
 }
 
 fn info_as_json(hello: &Hello, health: &Health) -> Value {
-    json!({
-        "device": hello_as_json(hello),
-        "health": {
-            "uptime_ms": health.uptime,
-            "pairs": health.pairs,
-            "refused": health.refused,
-            "dropped": health.dropped,
-            "timeouts": health.timeouts,
-            "restarts": health.restarts,
-            "rejected_bytes": health.rejected_bytes,
-            "rejected_frames": health.rejected_frames,
-            "watchdog_resets": health.watchdog_resets,
-            "storage_faults": health.storage_faults,
-        },
-    })
+    json!({ "device": hello_as_json(hello), "health": health_as_json(health) })
 }
 
 /// `auto`, or lines and gain for both eyes.

@@ -18,6 +18,10 @@
 //!
 //! --record keeps what came, byte for byte; `host replay FILE` makes the same models of it again.
 //!
+//! --publish tells a fleet of shapes, models and how the device fares, and takes orders from it (docs/fleet.md). Several
+//! devices are listened to side by side when each has its own --port, --calib and --publish; their models are then below
+//! --out/SITE/BOARD.
+//!
 //! With --json, every pair is a line of JSON when it is done, and the last line is about the link.
 //!
 //! Examples:
@@ -25,15 +29,17 @@
 //!   host listen --port /dev/ttyACM0 --calib calib.yaml --frames 10 --out models
 //!   host listen --calib calib.yaml --view
 //!   host listen --port unix:/tmp/camera --calib calib.yaml --record cup.link --json
+//!   host listen --port /dev/ttyACM0 --calib calib.yaml --publish ossature/lab/left
 
 mod desk;
 mod orders;
 mod recording;
 
 use std::fs;
-use std::path::PathBuf;
-use std::sync::atomic::Ordering;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
+use std::thread;
 use std::time::{Duration, Instant};
 
 use clap::builder::ArgPredicate;
@@ -42,18 +48,22 @@ use shared::stage::binarise::{Polarity, Threshold};
 use shared::wire::ToDevice;
 
 use super::connect::{PortArgs, model_of};
-use super::options::GrowArgs;
+use super::options::{GrowArgs, usage};
+use super::publish::PublishArgs;
 use super::view::ViewArgs;
-use super::{Failure, interruption, words_of};
-use crate::live::control::{Limits, Settings};
+use super::{Failure, interruption, note, words_of};
+use crate::fleet::Link;
+use crate::fleet::key::Board;
+use crate::live::control::{Control, Limits, Settings};
 use crate::reconstruct::Options;
 use crate::report::words::{parse_polarity, parse_threshold};
 use crate::source::exposure::Range;
 use crate::source::serial::inbox::Message;
+use crate::source::serial::port::Address;
 use crate::source::serial::recording::Writer;
 use crate::source::serial::session::Session;
-use desk::Desk;
 pub(super) use desk::Wanted;
+use desk::{Audience, Desk};
 use orders::Orders;
 pub(super) use recording::replay;
 
@@ -69,8 +79,8 @@ pub struct Args {
     #[command(flatten)]
     port: PortArgs,
     /// Calibration that the device keeps: OpenCV (M1 D1 M2 D2 R T), ROS or Kalibr
-    #[arg(long, value_name = "FILE")]
-    calib: PathBuf,
+    #[arg(long, value_name = "FILE", required = true)]
+    calib: Vec<PathBuf>,
     /// Have the device part object and background here, instead of as it was told before
     #[arg(long, value_parser = parse_threshold, value_name = "otsu|N")]
     threshold: Option<Threshold>,
@@ -90,11 +100,13 @@ pub struct Args {
     record: Option<PathBuf>,
     #[command(flatten)]
     view: ViewArgs,
+    #[command(flatten)]
+    publish: PublishArgs,
     /// Folder for the results
     #[arg(
         long,
         value_name = "DIR",
-        default_value_if("view", ArgPredicate::IsPresent, None),
+        default_value_ifs([("view", ArgPredicate::IsPresent, None), ("publish", ArgPredicate::IsPresent, None)]),
         default_value = "ossature-out"
     )]
     out: Option<PathBuf>,
@@ -109,14 +121,84 @@ pub struct Args {
     pub(super) json: bool,
 }
 
+/// One device among those that are listened to.
+struct Seat<'a> {
+    port: &'a Address,
+    calib: &'a Path,
+    /// What a fleet knows it as.
+    board: Option<&'a Board>,
+    /// None if models are only looked at.
+    out: Option<PathBuf>,
+    /// Whether it has to be told from others.
+    is_named: bool,
+}
+
+impl Args {
+    fn seats(&self) -> Result<Vec<Seat<'_>>, Failure> {
+        let (ports, boards) = (self.port.all(), self.publish.boards());
+        if let ([port], [calib], [] | [_]) = (ports, &self.calib[..], boards) {
+            let (board, out) = (boards.first(), self.out.clone());
+            return Ok(vec![Seat { port, calib, board, out, is_named: false }]);
+        }
+        if [self.calib.len(), boards.len()] != [ports.len(); 2] {
+            return Err(usage(
+                "each device has its own --port, --calib and --publish, in the same order: give as many of each",
+            ));
+        }
+        if (1..boards.len()).any(|k| boards[..k].contains(&boards[k])) {
+            return Err(usage("two devices are published under one name: give each its own"));
+        }
+        if self.view.is_wanted() || self.record.is_some() {
+            return Err(usage(
+                "--view and --record are for one device; `host subscribe --view` shows several",
+            ));
+        }
+        Ok(ports
+            .iter()
+            .zip(&self.calib)
+            .zip(boards)
+            .map(|((port, calib), board)| {
+                let out = self.out.as_ref().map(|out| out.join(board.site()).join(board.name()));
+                Seat { port, calib, board: Some(board), out, is_named: true }
+            })
+            .collect())
+    }
+}
+
 /// Listens.
 ///
 /// # Errors
 ///
 /// If there is no device, its calibration is another, or no pair gives a model.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let model = model_of(&args.calib)?;
-    let options = Options { draft: args.out.is_none(), ..args.grow.device_options() };
+    let seats = args.seats()?;
+    let (stop, link) = (interruption()?, args.publish.meet()?);
+    if let [seat] = &seats[..] {
+        return one(args, seat, link.as_ref(), &stop);
+    }
+    // What one of them fails by is told at once, and the others go on.
+    let failed = |seat: &Seat<'_>| {
+        let failure = one(args, seat, link.as_ref(), &stop).err()?;
+        let name = seat.board.map_or_else(String::new, Board::to_string);
+        note(&format!("{name}: {}", words_of(&*failure)));
+        Some(name)
+    };
+    let failed: Vec<String> = thread::scope(|scope| {
+        let threads: Vec<_> = seats.iter().map(|seat| scope.spawn(|| failed(seat))).collect();
+        let joined = threads.into_iter().map(|thread| thread.join());
+        joined.filter_map(|name| name.unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
+    });
+    if failed.is_empty() {
+        return Ok(());
+    }
+    Err(format!("{} of {} devices failed: {}", failed.len(), seats.len(), failed.join(", ")).into())
+}
+
+/// Listens to one device.
+fn one(args: &Args, seat: &Seat<'_>, link: Option<&Link>, stop: &AtomicBool) -> Result<(), Failure> {
+    let model = model_of(seat.calib)?;
+    let draft = seat.out.is_none() && link.is_none();
+    let options = Options { draft, ..args.grow.device_options() };
     let wanted = Wanted { page: args.report, json: args.json, timings: args.timings };
     let asked = Settings {
         threshold: args.threshold.unwrap_or_default(),
@@ -124,11 +206,19 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         ..Settings::default()
     };
     let view = args.view.open("a camera device", asked, limits)?;
-    let mut desk = Desk::new((&model, &options), (args.out.as_deref(), wanted), view);
+    let fleet = link.zip(seat.board);
+    let control = match &view {
+        Some(view) => Some(Arc::clone(view.control())),
+        None => fleet.map(|_| Arc::new(Control::new(asked, limits()))),
+    };
+    let voice =
+        fleet.zip(control.as_ref()).map(|((link, board), control)| args.publish.voice(link, board, control));
+    let name = seat.board.filter(|_| seat.is_named).map(Board::to_string);
+    let audience = Audience { view, voice: voice.transpose()?, control, name };
+    let mut desk = Desk::new((&model, &options), (seat.out.as_deref(), wanted), audience);
     let end = args.seconds.map(|seconds| Instant::now() + Duration::from_secs(seconds.into()));
-    let stop = interruption()?;
-    let mut session = begin(args, &model, &mut desk)?;
-    let mut orders = Orders::new(args, asked, &options);
+    let mut session = begin(args, seat.port, &model, &mut desk)?;
+    let mut orders = Orders::new(args, asked, &options, desk.audience.control.is_some());
     let heard = listen(args, (&mut session, &mut orders), &mut desk, || {
         stop.load(Ordering::Relaxed) || end.is_some_and(|end| Instant::now() >= end)
     });
@@ -143,10 +233,10 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 
 /// Find the device and greet it. The recording has to be new before anything comes, and is taken away again if
 /// there is nothing to record.
-fn begin(args: &Args, model: &PairModel, desk: &mut Desk<'_>) -> Result<Session, Failure> {
+fn begin(args: &Args, port: &Address, model: &PairModel, desk: &mut Desk<'_>) -> Result<Session, Failure> {
     let recording = args.record.as_ref().map(|path| Writer::begin(path, model)).transpose()?;
     let tap = recording.map(|writer| Arc::new(Mutex::new(writer)));
-    let begun = args.port.begin(tap).map_err(Failure::from);
+    let begun = args.port.begin(port, tap).map_err(Failure::from);
     let greeted = begun.and_then(|(session, hello)| desk.greeted(&hello).map(|()| session));
     if let (Err(_), Some(path)) = (&greeted, &args.record) {
         // Why there is no device matters more than a file that stays.
@@ -182,7 +272,7 @@ fn listen(
             }
             Ok(None) => {}
             Err(error) if error.is_loss() => {
-                desk.remark(&format!("{}; waiting for the device", words_of(&error)));
+                desk.lost(&words_of(&error), &session.tally());
                 let Some(hello) = session.resume(&over, |error| desk.remark(&words_of(error)))? else {
                     break;
                 };
@@ -199,5 +289,5 @@ fn listen(
 /// What can be set of a device.
 fn limits() -> Limits {
     let region = Err("a device looks at all of its pictures");
-    Limits { threshold: Ok(()), polarity: Ok(()), region, exposure: Ok(LINES) }
+    Limits { threshold: Ok(()), polarity: Ok(()), region, exposure: Ok(LINES), pairs: Ok(()) }
 }

@@ -31,6 +31,7 @@ pub mod evaluate;
 pub mod experiments;
 pub mod inspect;
 pub mod list_devices;
+pub mod fleet;
 pub mod listen;
 pub mod looks;
 pub mod batch;
@@ -43,9 +44,11 @@ mod line;
 pub mod man;
 mod model;
 pub mod options;
+mod publish;
 pub mod render;
 pub mod replay;
 mod scene;
+pub mod subscribe;
 mod table;
 mod timings;
 mod view;
@@ -124,6 +127,12 @@ enum Command {
     /// Models from a camera device
     #[command(long_about = page(include_str!("listen.rs")))]
     Listen(listen::Args),
+    /// What live boards publish: kept, or shown
+    #[command(long_about = page(include_str!("subscribe.rs")))]
+    Subscribe(subscribe::Args),
+    /// Live boards: which there are, and orders to them
+    #[command(long_about = page(include_str!("fleet.rs")))]
+    Fleet(fleet::Args),
     /// A camera device: who it is, its calibration, its settings, its pictures
     #[command(long_about = page(include_str!("device.rs")))]
     Device(device::Args),
@@ -208,6 +217,8 @@ impl Cli {
             Command::ListDevices(args) => told(args.json, list_devices::run(args)),
             Command::Calibrate(args) => calibrate::run(args),
             Command::Listen(args) => told(args.json, listen::run(args)),
+            Command::Subscribe(args) => told(args.json, subscribe::run(args)),
+            Command::Fleet(args) => told(args.json, fleet::run(args)),
             Command::Device(args) => told(args.json, device::run(args)),
             Command::Demo(args) => told(args.json, demo::run(args)),
             Command::Render(args) => told(args.json, render::run(args)),

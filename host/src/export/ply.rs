@@ -55,33 +55,41 @@ pub fn write_known_mesh(
     let counts = [("vertices", mesh.vertices.len()), ("faces", mesh.faces.len())];
     check(path, comments, &counts, mesh.faces.as_flattened(), mesh.vertices.len())?;
     check_scalars(path, scalars, mesh.vertices.len())?;
-    write_whole(path, |file| {
-        begin(file, comments, mesh.vertices.len(), scalars)?;
-        writeln!(file, "element face {}", mesh.faces.len())?;
-        writeln!(file, "property list uchar int vertex_indices\nend_header")?;
-        let mut records = Vec::new();
-        for (chunk, vertices) in mesh.vertices.chunks(RECORDS).enumerate() {
-            records.clear();
-            for (k, vertex) in vertices.iter().enumerate() {
-                let record = [vertex.x, vertex.y, vertex.z].map(|x| (x as f32).to_le_bytes());
-                records.extend_from_slice(record.as_flattened());
-                for (_, values) in scalars {
-                    records.extend_from_slice(&(values[chunk * RECORDS + k] as f32).to_le_bytes());
-                }
+    write_whole(path, |file| mesh_into(file, mesh, scalars, comments))
+}
+
+/// The bytes of such a file.
+pub(crate) fn mesh_into(
+    file: &mut impl Write,
+    mesh: &Mesh,
+    scalars: Scalars<'_>,
+    comments: &[&str],
+) -> io::Result<()> {
+    begin(file, comments, mesh.vertices.len(), scalars)?;
+    writeln!(file, "element face {}", mesh.faces.len())?;
+    writeln!(file, "property list uchar int vertex_indices\nend_header")?;
+    let mut records = Vec::new();
+    for (chunk, vertices) in mesh.vertices.chunks(RECORDS).enumerate() {
+        records.clear();
+        for (k, vertex) in vertices.iter().enumerate() {
+            let record = [vertex.x, vertex.y, vertex.z].map(|x| (x as f32).to_le_bytes());
+            records.extend_from_slice(record.as_flattened());
+            for (_, values) in scalars {
+                records.extend_from_slice(&(values[chunk * RECORDS + k] as f32).to_le_bytes());
             }
-            file.write_all(&records)?;
         }
-        for faces in mesh.faces.chunks(RECORDS) {
-            records.clear();
-            for face in faces {
-                let mut record = [3; 13];
-                record[1..].copy_from_slice(face.map(u32::to_le_bytes).as_flattened());
-                records.extend_from_slice(&record);
-            }
-            file.write_all(&records)?;
+        file.write_all(&records)?;
+    }
+    for faces in mesh.faces.chunks(RECORDS) {
+        records.clear();
+        for face in faces {
+            let mut record = [3; 13];
+            record[1..].copy_from_slice(face.map(u32::to_le_bytes).as_flattened());
+            records.extend_from_slice(&record);
         }
-        Ok(())
-    })
+        file.write_all(&records)?;
+    }
+    Ok(())
 }
 
 /// Writes points, or a curve. `comments` go to the header, a line each.

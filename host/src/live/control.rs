@@ -39,6 +39,8 @@ pub struct Limits {
     pub region: Result<(), &'static str>,
     /// How pictures are taken.
     pub exposure: Result<Range, String>,
+    /// How many pairs are taken.
+    pub pairs: Result<(), &'static str>,
 }
 
 /// The settings, between those who set them and those who obey.
@@ -56,6 +58,8 @@ struct State {
     version: u64,
     /// Of a view, px, once one was seen.
     size: Option<(u32, u32)>,
+    /// Pairs that are still to be taken; None for all that come.
+    pairs: Option<u32>,
 }
 
 /// What somebody wants; what is not named stays.
@@ -68,13 +72,15 @@ struct Wish {
     region: Option<String>,
     /// `auto`, or a number of the camera's unit.
     exposure: Option<String>,
+    /// `all`, or how many more: 1 is a single shot, 0 a pause.
+    pairs: Option<String>,
 }
 
 impl Control {
     /// The settings at first, and what can be set.
     #[must_use]
     pub fn new(settings: Settings, limits: Limits) -> Self {
-        let state = Mutex::new(State { settings, version: 0, size: None });
+        let state = Mutex::new(State { settings, version: 0, size: None, pairs: None });
         Self { limits, state, changed: Condvar::new() }
     }
 
@@ -99,8 +105,23 @@ impl Control {
         state.version != version
     }
 
+    /// Whether pairs are to be taken at all.
+    #[must_use]
+    pub fn wants_pairs(&self) -> bool {
+        self.lock().pairs != Some(0)
+    }
+
+    /// A pair has come: whether it is wanted. If so many were asked for, it is one of them.
+    #[must_use]
+    pub fn take_pair(&self) -> bool {
+        let State { pairs, .. } = &mut *self.lock();
+        let wanted = *pairs != Some(0);
+        *pairs = pairs.map(|pairs| pairs.saturating_sub(1));
+        wanted
+    }
+
     /// Views of this size are made; a region must lie within.
-    pub(super) fn saw(&self, size: (u32, u32)) {
+    pub(crate) fn saw(&self, size: (u32, u32)) {
         self.lock().size = Some(size);
     }
 
@@ -108,7 +129,7 @@ impl Control {
     ///
     /// # Errors
     /// A sentence, and nothing was set.
-    pub(super) fn wish(&self, json: &[u8]) -> Result<(), String> {
+    pub(crate) fn wish(&self, json: &[u8]) -> Result<(), String> {
         let wish: Wish =
             serde_json::from_slice(json).map_err(|error| format!("no wish that is known: {error}"))?;
         let mut state = self.lock();
@@ -128,6 +149,10 @@ impl Control {
         if let Some(text) = wish.exposure {
             settings.exposure = Some(exposure(&text, self.limits.exposure.as_ref()?)?);
         }
+        if let Some(text) = wish.pairs {
+            self.limits.pairs?;
+            state.pairs = pairs(&text)?;
+        }
         if settings != state.settings {
             state.settings = settings;
             state.version += 1;
@@ -136,10 +161,10 @@ impl Control {
         Ok(())
     }
 
-    /// All of it, for a page.
-    pub(super) fn told(&self) -> Value {
-        let (settings, version) = self.settings();
-        let Limits { threshold, polarity, region, exposure } = &self.limits;
+    /// All of it, for those who set it.
+    pub(crate) fn told(&self) -> Value {
+        let State { settings, version, pairs, .. } = *self.lock();
+        let Limits { threshold, polarity, region, exposure, pairs: takes } = &self.limits;
         let range = exposure.as_ref().ok();
         json!({
             "version": version,
@@ -157,6 +182,10 @@ impl Control {
                 "most": range.map(|range| range.most),
                 "unit": range.map(|range| range.unit),
                 "auto": range.map(|range| range.auto),
+            },
+            "pairs": {
+                "value": pairs.map_or_else(|| "all".to_owned(), |pairs| pairs.to_string()),
+                "why": takes.err(),
             },
         })
     }
@@ -211,13 +240,22 @@ fn exposure(text: &str, range: &Range) -> Result<Exposure, String> {
     }
 }
 
+fn pairs(text: &str) -> Result<Option<u32>, String> {
+    match text.parse() {
+        Ok(pairs) => Ok(Some(pairs)),
+        Err(_) if text == "all" => Ok(None),
+        Err(_) => Err("give all, or how many more pairs: 1 for a single one, 0 for a pause".into()),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn control() -> Control {
         let exposure = Ok(Range { least: 1, most: 500, unit: "x 0.1 ms", auto: true });
-        let limits = Limits { threshold: Ok(()), polarity: Err("it is so"), region: Ok(()), exposure };
+        let limits =
+            Limits { threshold: Ok(()), polarity: Err("it is so"), region: Ok(()), exposure, pairs: Ok(()) };
         Control::new(Settings::default(), limits)
     }
 
@@ -257,6 +295,7 @@ mod tests {
             (r#"{"region": "4294967295,0,20,20"}"#, "320x240"),
             (r#"{"region": "1,2,3"}"#, "X,Y,W,H"),
             (r#"{"exposure": "0"}"#, "give auto, or 1 to 500 x 0.1 ms"),
+            (r#"{"pairs": "few"}"#, "give all, or how many"),
             (r#"{"gain": "1"}"#, "gain"),
             ("[]", "no wish"),
             ("", "no wish"),
@@ -265,6 +304,22 @@ mod tests {
             assert!(error.contains(words), "{wish}: {error}");
         }
         assert_eq!(control.settings(), (Settings::default(), 0));
+    }
+
+    #[test]
+    fn so_many_pairs_are_taken_as_were_asked_for() {
+        let control = control();
+        let taken = || (0..4).filter(|_| control.take_pair()).count();
+        assert!(control.wants_pairs() && taken() == 4);
+        control.wish(br#"{"pairs": "1"}"#).unwrap();
+        assert_eq!(control.told()["pairs"]["value"], "1");
+        assert!(control.wants_pairs() && taken() == 1 && !control.wants_pairs());
+        control.wish(br#"{"pairs": "3"}"#).unwrap();
+        assert_eq!((taken(), taken()), (3, 0));
+        control.wish(br#"{"pairs": "all"}"#).unwrap();
+        assert_eq!(taken(), 4);
+        // It is nothing that a pair is made with.
+        assert_eq!(control.settings().1, 0);
     }
 
     #[test]

@@ -146,8 +146,8 @@ pub(super) mod tests {
     #[test]
     fn a_refused_pair_shows_what_the_cameras_saw_and_why() {
         let none = || Err("no");
-        let limits =
-            Limits { threshold: Ok(()), polarity: none(), region: none(), exposure: Err("no".to_owned()) };
+        let exposure = Err("no".to_owned());
+        let limits = Limits { threshold: Ok(()), polarity: none(), region: none(), exposure, pairs: none() };
         let control = Control::new(Settings::default(), limits);
         let frame = refused(7);
         let told: Value = serde_json::from_slice(&frame.json(&control)).unwrap();

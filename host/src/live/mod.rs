@@ -13,15 +13,14 @@
 pub mod control;
 mod frame;
 mod guard;
+pub(crate) mod rate;
 mod server;
 mod slot;
 
-use std::collections::VecDeque;
 use std::io::{self, ErrorKind};
 use std::net::{Ipv4Addr, TcpListener};
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
-use std::time::{Duration, Instant};
 
 use tokio::sync::oneshot;
 
@@ -30,12 +29,11 @@ use control::{Control, Limits, Settings};
 use frame::Frame;
 pub use frame::Shot;
 use guard::Guard;
+use rate::Rate;
 use slot::Slot;
 
 /// What a live page may ask for beyond what a report may.
 const POLICY: &str = "; connect-src 'self'";
-/// Time over which the rate is taken.
-const RATE_OVER: Duration = Duration::from_secs(3);
 
 /// Why there is no live page.
 #[derive(Debug, thiserror::Error)]
@@ -64,8 +62,7 @@ pub struct View {
     slot: Arc<Slot>,
     control: Arc<Control>,
     shown: u64,
-    /// When the last pairs were shown.
-    times: VecDeque<Instant>,
+    rate: Rate,
     /// Dropped first, which ends the thread.
     stop: Option<oneshot::Sender<()>>,
     thread: Option<JoinHandle<()>>,
@@ -104,7 +101,7 @@ impl View {
             slot,
             control,
             shown: 0,
-            times: VecDeque::new(),
+            rate: Rate::default(),
             stop,
             thread,
         })
@@ -118,19 +115,13 @@ impl View {
 
     /// What a person may set.
     #[must_use]
-    pub fn control(&self) -> &Control {
+    pub const fn control(&self) -> &Arc<Control> {
         &self.control
     }
 
     /// Show a pair in place of the one before, which is returned if nobody is looking at it any more.
     pub fn show(&mut self, shot: Shot) -> Option<Shot> {
-        let now = Instant::now();
-        while self.times.front().is_some_and(|time| now - *time > RATE_OVER) {
-            self.times.pop_front();
-        }
-        let rate =
-            self.times.front().map(|first| self.times.len() as f64 / (now - *first).as_secs_f64().max(1e-9));
-        self.times.push_back(now);
+        let rate = self.rate.step();
         self.shown += 1;
         if let Some(pictures) = &shot.pictures {
             self.control.saw(pictures[0].dimensions());

@@ -22,6 +22,8 @@ pub mod nurbs;
 pub mod program;
 pub mod raster;
 pub mod scene;
+#[cfg(unix)]
+pub mod socket;
 pub mod stack;
 pub mod sums;
 pub mod thumb;

@@ -2,14 +2,17 @@
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use image::GrayImage;
 use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::json;
 
 use super::super::model::{self, Model, NoModel, Order, Place, warnings};
 use super::super::options::NoCalibration;
+use super::super::publish::Voice;
 use super::super::table::{count, sides};
 use super::super::timings::Timings;
 use super::super::view::{self, Beside};
@@ -17,8 +20,9 @@ use super::super::{Failure, say, say_json, words_of};
 use super::Args;
 use crate::calibration::StereoCamera;
 use crate::live::View;
-use crate::live::control::{Limits, Settings};
+use crate::live::control::{Control, Limits, Settings};
 use crate::reconstruct::{Options, Workspace};
+use crate::report::record::Record;
 use crate::source::exposure::Exposure;
 use crate::source::recording::Recording;
 use crate::source::scene::Scene;
@@ -50,6 +54,10 @@ pub(super) struct Session<'a> {
     scene: Scene,
     /// The live page, if it is wanted.
     view: Option<View>,
+    /// A fleet, if it is wanted.
+    voice: Option<Voice>,
+    /// What those who look on set.
+    control: Option<Arc<Control>>,
     dials: Vec<Dial>,
     /// What the first pair and the last one were made with.
     first: Settings,
@@ -108,8 +116,19 @@ impl<'a> Session<'a> {
             polarity: view::polarity(&args.scene),
             region: Ok(()),
             exposure: dials.first().map(|dial| dial.range().clone()).ok_or_else(|| NO_DIAL.into()),
+            pairs: Ok(()),
         };
-        let view = args.view.open(&args.title(), settings, limits)?;
+        let link = args.publish.meet()?;
+        let view = args.view.open(&args.title(), settings, &limits)?;
+        let control = match &view {
+            Some(view) => Some(Arc::clone(view.control())),
+            None => link.as_ref().map(|_| Arc::new(Control::new(settings, limits()))),
+        };
+        let mut voice = None;
+        if let (Some(link), [board, ..], Some(control)) = (&link, args.publish.boards(), &control) {
+            let voice = voice.insert(args.publish.voice(link, board, control)?);
+            voice.greeted(json!({ "camera": args.title() }));
+        }
         let calibration = rig.calibration.map(|calibration| (calibration, rig.file.clone()));
         let record = |folder| Recording::begin(folder, calibration);
         let recording = args.record.as_deref().map(record).transpose()?;
@@ -123,6 +142,8 @@ impl<'a> Session<'a> {
             calibration: rig.calibration,
             scene,
             view,
+            voice,
+            control,
             dials,
             first: settings,
             settings,
@@ -144,6 +165,9 @@ impl<'a> Session<'a> {
         let (tally, result) =
             live::run(&mut rig.pairs, &rig.optics, stop, |live, tally| self.take(live, tally));
         self.bar.finish_and_clear();
+        if let Some(voice) = &mut self.voice {
+            voice.end(json!({ "dropped": tally.dropped }));
+        }
         if let Some(view) = &self.view {
             view::tell_flags(view, &self.first);
         }
@@ -167,11 +191,16 @@ impl<'a> Session<'a> {
     fn take(&mut self, live: Live, tally: &Tally) -> ControlFlow<()> {
         if self.skip > 0 {
             self.skip -= 1;
+        } else if self.control.as_ref().is_some_and(|control| !control.take_pair()) {
+            // It is not wanted.
         } else if let Err(failure) = self.work_on(live, tally) {
             self.failure = Some(failure);
             return ControlFlow::Break(());
         } else {
             self.show(tally);
+        }
+        if let Some(voice) = &mut self.voice {
+            voice.status(json!({ "dropped": tally.dropped }));
         }
         let enough = self.args.frames.is_some_and(|frames| self.done.len() as u64 >= frames)
             || self.args.seconds.is_some_and(|seconds| self.begun.elapsed().as_secs_f64() >= seconds);
@@ -193,6 +222,10 @@ impl<'a> Session<'a> {
         let name = format!("{number:06}");
         if let Some(recording) = &mut self.recording {
             recording.add(number, &views.images)?;
+        }
+        if let (Some(control), Some(voice)) = (&self.control, &mut self.voice) {
+            control.saw(views.images[0].dimensions());
+            voice.begin();
         }
         self.obey();
         let result = if self.args.only_record {
@@ -221,6 +254,7 @@ impl<'a> Session<'a> {
             Err(failure) if failure.is::<NoModel>() => Err(words_of(&*failure)),
             Err(failure) => return Err(failure),
         };
+        self.publish(&name, &result);
         self.done.push(Done { name, result, latency: now().saturating_sub(arrived), gap });
         Ok(())
     }
@@ -231,10 +265,21 @@ impl<'a> Session<'a> {
         Ok(self.scene.apply(views, calibration)?)
     }
 
-    /// Does what was set on the page.
+    /// Tells a fleet what became of a pair.
+    fn publish(&mut self, name: &str, result: &Result<Success, String>) {
+        let Some(voice) = &mut self.voice else { return };
+        match result {
+            Ok(Success { warnings, .. }) => {
+                voice.pair(&json!({ "pair": name, "warnings": warnings }), warnings)
+            }
+            Err(why) => voice.pair(&json!({ "pair": name, "error": why }), std::slice::from_ref(why)),
+        }
+    }
+
+    /// Does what those who look on have set.
     fn obey(&mut self) {
-        let Some(view) = &self.view else { return };
-        let (settings, _) = view.control().settings();
+        let Some(control) = &self.control else { return };
+        let (settings, _) = control.settings();
         let exposure = settings.exposure.filter(|_| settings.exposure != self.settings.exposure);
         self.settings = settings;
         view::obey(&settings, &mut self.options, &mut self.scene);
@@ -265,9 +310,22 @@ impl<'a> Session<'a> {
             truth: None,
             place: Place { folder, report: self.args.json && self.args.best, page: self.args.report },
         };
+        let mut record =
+            if beside.is_some() || order.pictures { Record::new() } else { Record::figures_only() };
+        let made = model::make_recorded(order, &mut record, &mut self.workspace);
+        if let (Some(voice), Ok((_, made))) = (&mut self.voice, &made) {
+            voice.model(made);
+        }
         let model = match (beside, &mut self.view) {
-            (Some(beside), Some(view)) => view::make(order, beside, view, &mut self.workspace)?,
-            _ => model::make(order, &mut self.workspace)?,
+            (Some(beside), Some(view)) => {
+                let choices = (calibration, self.options);
+                view::show((made, record), choices, beside, view, &mut self.workspace)?
+            }
+            _ => {
+                let (model, made) = made?;
+                self.workspace.recycle(made);
+                model
+            }
         };
         if let Some(timings) = &mut self.timings {
             timings.add(None, &model);

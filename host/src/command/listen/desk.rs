@@ -2,14 +2,16 @@
 
 use super::orders::ORDERS;
 use crate::command::connect::{
-    check_calibration, hello_as_json, link_as_json, link_in_words, progress, version,
+    check_calibration, health_as_json, hello_as_json, link_as_json, link_in_words, progress, version,
 };
 use crate::command::model::{self, Model, NoModel, Place};
+use crate::command::publish::Voice;
 use crate::command::table::{count, sides};
 use crate::command::timings::Timings;
 use crate::command::view::{self, Beside};
 use crate::command::{Failure, note, say, words_of};
 use crate::live::View;
+use crate::live::control::Control;
 use crate::reconstruct::{Options, Workspace};
 use crate::report::record::Record;
 use crate::source::serial::inbox::{Hello, Inbox, Message, Pair};
@@ -20,6 +22,7 @@ use serde_json::{Value, json};
 use shared::camera::PairModel;
 use shared::wire::{PictureKind, ToDevice};
 use std::path::Path;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
@@ -37,6 +40,19 @@ pub(crate) struct Wanted {
     pub(crate) timings: bool,
 }
 
+/// Who looks on beside the one who started it, and may set things.
+#[derive(Default)]
+pub(super) struct Audience {
+    /// The live page, if it is wanted.
+    pub(super) view: Option<View>,
+    /// A fleet, if it is wanted.
+    pub(super) voice: Option<Voice>,
+    /// What they set.
+    pub(super) control: Option<Arc<Control>>,
+    /// The device's name among others that are listened to.
+    pub(super) name: Option<String>,
+}
+
 /// Where messages become models and words.
 pub(super) struct Desk<'a> {
     model: &'a PairModel,
@@ -45,8 +61,7 @@ pub(super) struct Desk<'a> {
     out: Option<&'a Path>,
     page: bool,
     json: bool,
-    /// The live page, if it is wanted.
-    pub(super) view: Option<View>,
+    pub(super) audience: Audience,
     /// Of both eyes in the last pair, 1/256.
     pub(super) gains: [u16; 2],
     /// What the device refused of what was set last: one of each of [`ORDERS`].
@@ -66,7 +81,7 @@ impl<'a> Desk<'a> {
     pub(super) fn new(
         (model, options): (&'a PairModel, &'a Options),
         (out, wanted): (Option<&'a Path>, Wanted),
-        view: Option<View>,
+        audience: Audience,
     ) -> Self {
         let Wanted { page, json, timings } = wanted;
         Self {
@@ -75,13 +90,13 @@ impl<'a> Desk<'a> {
             out,
             page,
             json,
-            view,
+            bar: if audience.name.is_none() { progress() } else { ProgressBar::hidden() },
+            audience,
             gains: [GAIN; 2],
             refusals: Default::default(),
             timings: timings.then(Timings::begin),
             mosaic: Mosaic::new(PictureKind::Grey),
             workspace: Workspace::default(),
-            bar: progress(),
             start: Instant::now(),
             pairs: 0,
             models: 0,
@@ -90,7 +105,7 @@ impl<'a> Desk<'a> {
 
     /// Keeps the last pair on the page until the end.
     pub(super) fn hold(&self, stop: &AtomicBool) {
-        let Some(view) = &self.view else { return };
+        let Some(view) = &self.audience.view else { return };
         if self.pairs == 0 {
             return;
         }
@@ -103,7 +118,7 @@ impl<'a> Desk<'a> {
         }
     }
 
-    /// Gives the device one of [`ORDERS`]; returns whether it obeys. With a page, a refusal is told and goes on.
+    /// Gives the device one of [`ORDERS`]; returns whether it obeys. With an audience, a refusal is told and goes on.
     pub(super) fn give(
         &mut self,
         session: &mut Session,
@@ -112,7 +127,7 @@ impl<'a> Desk<'a> {
     ) -> Result<bool, SessionError> {
         let refusal = match session.order(order) {
             Ok(()) => None,
-            Err(error @ SessionError::Refused(_)) if self.view.is_some() => {
+            Err(error @ SessionError::Refused(_)) if self.audience.control.is_some() => {
                 Some(format!("{}: {}", ORDERS[which], words_of(&error)))
             }
             Err(error) => return Err(error),
@@ -129,12 +144,34 @@ impl<'a> Desk<'a> {
 
     /// A line to standard error.
     pub(super) fn remark(&self, line: &str) {
-        self.bar.suspend(|| note(line));
+        let line = self.named(line);
+        self.bar.suspend(|| note(&line));
+    }
+
+    /// The device is gone, and is waited for.
+    pub(super) fn lost(&mut self, why: &str, tally: &Tally) {
+        self.remark(&format!("{why}; waiting for the device"));
+        if let Some(voice) = &mut self.audience.voice {
+            voice.gone(why, link_as_json(tally));
+        }
+    }
+
+    /// Whose line it is, if there are several devices.
+    fn named(&self, line: &str) -> String {
+        self.audience.name.as_ref().map_or_else(|| line.to_owned(), |name| format!("{name}: {line}"))
     }
 
     /// A line to standard output.
     fn line(&self, json: impl FnOnce() -> Value, text: impl FnOnce() -> String) -> Result<(), Failure> {
-        let line = if self.json { json().to_string() } else { text() };
+        let line = if self.json {
+            let mut told = json();
+            if let Some(name) = &self.audience.name {
+                merge(&mut told, json!({ "board": name }));
+            }
+            told.to_string()
+        } else {
+            self.named(&text())
+        };
         self.bar.suspend(|| say(&format!("{line}\n")))
     }
 
@@ -142,6 +179,10 @@ impl<'a> Desk<'a> {
         check_calibration(self.model, hello)?;
         // It numbers its pairs anew.
         self.mosaic = Mosaic::new(PictureKind::Grey);
+        if let Some(voice) = &mut self.audience.voice {
+            voice.greeted(hello_as_json(hello));
+            voice.calibration(self.model);
+        }
         self.line(
             || json!({ "device": hello_as_json(hello) }),
             || {
@@ -158,19 +199,31 @@ impl<'a> Desk<'a> {
 
     /// One message; so many before it were lost.
     pub(super) fn take(&mut self, inbox: &mut Inbox, message: Message, lost: u32) -> Result<(), Failure> {
-        let pair = match message {
-            Message::Pair(pair) => pair,
-            Message::Picture(part) => {
+        let pair = match (message, &mut self.audience.voice) {
+            (Message::Pair(pair), _) => pair,
+            (Message::Picture(part), _) => {
                 self.mosaic.add(&part);
+                return Ok(());
+            }
+            (Message::Health(health), Some(voice)) => {
+                voice.health(&health_as_json(&health));
                 return Ok(());
             }
             _ => return Ok(()),
         };
+        // One that was under way when no more were wanted is of no use.
+        if self.audience.control.as_ref().is_some_and(|control| !control.take_pair()) {
+            return Ok(());
+        }
         self.pairs += 1;
         let name = format!("{:06}", self.pairs);
         let folder = self.out.map(|out| out.join(&name));
         let told = heading(&pair);
         self.gains = pair.exposures.map(|exposure| exposure.gain);
+        if let Some(voice) = &mut self.audience.voice {
+            voice.begin();
+            voice.shape(inbox.frame(&pair)?);
+        }
         match self.make((inbox, *pair), (name, folder.as_deref()), lost) {
             Ok(model) => {
                 self.models += 1;
@@ -178,6 +231,7 @@ impl<'a> Desk<'a> {
                     timings.add(None, &model);
                 }
                 let warnings = &model.warnings;
+                self.publish(&told, json!({ "warnings": warnings }), warnings);
                 self.line(
                     || {
                         let (mut told, more) = (
@@ -196,10 +250,12 @@ impl<'a> Desk<'a> {
             }
             Err(failure) if failure.is::<NoModel>() => {
                 let sentence = words_of(&*failure);
+                let error = json!({ "error": sentence });
+                self.publish(&told, error.clone(), std::slice::from_ref(&sentence));
                 self.line(
                     || {
                         let mut told = told.clone();
-                        merge(&mut told, json!({ "error": sentence }));
+                        merge(&mut told, error);
                         told
                     },
                     || format!("pair {}: refused: {sentence}", told["pair"]),
@@ -207,6 +263,14 @@ impl<'a> Desk<'a> {
             }
             Err(failure) => Err(failure),
         }
+    }
+
+    /// Tells a fleet what became of a pair.
+    fn publish(&mut self, told: &Value, more: Value, warnings: &[String]) {
+        let Some(voice) = &mut self.audience.voice else { return };
+        let mut told = told.clone();
+        merge(&mut told, more);
+        voice.pair(&told, warnings);
     }
 
     /// The model of a pair, in its folder if there is one, and on the page if there is one.
@@ -222,7 +286,11 @@ impl<'a> Desk<'a> {
         let pictures = self.mosaic.pictures_of(pair.number);
         let sent = (inbox, pair, pictures);
         let made = model::receive(sent, (self.model, self.options), place, &mut record, &mut self.workspace);
-        let Some(view) = &mut self.view else {
+        let Audience { view, voice, .. } = &mut self.audience;
+        if let (Some(voice), Ok((_, made))) = (voice, &made) {
+            voice.model(made);
+        }
+        let Some(view) = view else {
             let (model, made) = made?;
             self.workspace.recycle(made);
             return Ok(model);
@@ -233,16 +301,22 @@ impl<'a> Desk<'a> {
         view::show((made, record), choices, beside, view, &mut self.workspace)
     }
 
-    /// How it goes, on a terminal.
-    pub(super) fn show(&self, tally: &Tally) {
+    /// How it goes, on a terminal and in a fleet.
+    pub(super) fn show(&mut self, tally: &Tally) {
         let rate = f64::from(self.pairs) / self.start.elapsed().as_secs_f64().max(1e-3);
         let link = link_in_words(tally).map_or_else(String::new, |words| format!("; {words}"));
         let (models, pairs) = (self.models, self.pairs);
         self.bar.set_message(format!("{models} models of {pairs} pairs, {rate:.2} a second{link}"));
+        if let Some(voice) = &mut self.audience.voice {
+            voice.status(link_as_json(tally));
+        }
     }
 
-    pub(super) fn close(self, tally: &Tally) -> Result<(), Failure> {
+    pub(super) fn close(mut self, tally: &Tally) -> Result<(), Failure> {
         self.bar.finish_and_clear();
+        if let Some(voice) = &mut self.audience.voice {
+            voice.end(link_as_json(tally));
+        }
         if let Some(timings) = &self.timings {
             timings.tell();
         }

@@ -1,4 +1,4 @@
-//! What a device is told of how to look: by flags at first, and then by the page.
+//! What a device is told of how to look: by flags at first, and then by those who look on.
 
 use super::Args;
 use super::desk::Desk;
@@ -19,6 +19,8 @@ pub(super) struct Orders {
     kept: [Option<ToDevice>; ORDERS.len()],
     /// What of the page the device was told.
     settings: Settings,
+    /// Whether it takes pairs.
+    runs: bool,
     /// Whether the pictures of each pair are wanted, and of the next one are to be asked for.
     pictures: bool,
     due: bool,
@@ -27,14 +29,13 @@ pub(super) struct Orders {
 }
 
 impl Orders {
-    /// What the flags say, and with a page all that it shows as set.
-    pub(super) fn new(args: &Args, settings: Settings, options: &Options) -> Self {
-        let shown = args.view.is_wanted();
+    /// What the flags say, and all that is shown to others as set.
+    pub(super) fn new(args: &Args, settings: Settings, options: &Options, shown: bool) -> Self {
         let threshold = args.threshold.or_else(|| shown.then_some(settings.threshold));
         let polarity = args.polarity.or_else(|| shown.then_some(settings.polarity));
         let kept = [threshold.map(ToDevice::Threshold), polarity.map(ToDevice::Polarity), None];
         let pictures = options.front != Front::Balls;
-        Self { kept, settings, pictures, due: pictures, pair: None }
+        Self { kept, settings, runs: false, pictures, due: pictures, pair: None }
     }
 
     /// Has a device that was greeted begin.
@@ -44,9 +45,21 @@ impl Orders {
                 desk.give(session, which, order)?;
             }
         }
-        session.order_cameras(&ToDevice::Start)?;
+        self.runs = false;
+        self.run(desk.audience.control.as_ref().is_none_or(|control| control.wants_pairs()), session)?;
         (self.due, self.pair) = (self.pictures, None);
         self.ask_for_pictures(session)
+    }
+
+    /// Has the device take pairs, or none.
+    fn run(&mut self, runs: bool, session: &mut Session) -> Result<(), SessionError> {
+        match (self.runs, runs) {
+            (false, true) => session.order_cameras(&ToDevice::Start)?,
+            (true, false) => session.order(&ToDevice::Stop)?,
+            _ => {}
+        }
+        self.runs = runs;
+        Ok(())
     }
 
     /// Hears what the device says: when it has begun another pair, the pictures of the next one can be asked for. It
@@ -71,11 +84,12 @@ impl Orders {
         }
     }
 
-    /// Asks for pictures that are due, and passes on what was changed on the page.
+    /// Asks for pictures that are due, and passes on what was changed by those who look on.
     pub(super) fn follow(&mut self, session: &mut Session, desk: &mut Desk<'_>) -> Result<(), SessionError> {
         self.ask_for_pictures(session)?;
-        let Some(view) = &desk.view else { return Ok(()) };
-        let ((settings, _), before) = (view.control().settings(), self.settings);
+        let Some(control) = &desk.audience.control else { return Ok(()) };
+        let ((settings, _), before) = (control.settings(), self.settings);
+        let wanted = control.wants_pairs();
         let exposure = settings.exposure.filter(|_| settings.exposure != before.exposure);
         let exposure = exposure.map(|exposure| match exposure {
             Exposure::Auto => ExposureSetting::Auto,
@@ -98,6 +112,6 @@ impl Orders {
         }
         // Not before: what a device did not hear, because it was lost, it is told when it is back.
         self.settings = settings;
-        Ok(())
+        self.run(wanted, session)
     }
 }

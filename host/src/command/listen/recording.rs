@@ -1,6 +1,6 @@
 //! A recording, listened to again.
 
-use super::desk::{Desk, Wanted};
+use super::desk::{Audience, Desk, Wanted};
 use crate::command::view::Pace;
 use crate::command::{Failure, interruption};
 use crate::live::View;
@@ -29,7 +29,8 @@ pub(crate) fn replay(
     let (view, rate) = view.map_or((None, None), |(view, rate)| (Some(view), rate));
     let stop = if view.is_some() { interruption()? } else { Arc::default() };
     let mut pace = Pace::new(rate);
-    let mut desk = Desk::new((&recording.calibration, options), place, view);
+    let audience = Audience { view, ..Audience::default() };
+    let mut desk = Desk::new((&recording.calibration, options), place, audience);
     let (mut inbox, mut tally) = (Inbox::new()?, Tally::default());
     for (k, bytes) in recording.connections.iter().enumerate() {
         let mut buffer = vec![0; MAX_FRAME];

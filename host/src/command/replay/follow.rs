@@ -56,11 +56,18 @@ pub(super) fn limits(scene: &SceneArgs) -> Limits {
         polarity: view::polarity(scene),
         region: Ok(()),
         exposure: Err("these pictures were taken before".into()),
+        pairs: Err("these pictures were taken before"),
     }
 }
 
 /// What can be set for a device's recording.
 pub(super) fn limits_of_recording() -> Limits {
     let found = "a recording holds what the device has found in its pictures";
-    Limits { threshold: Err(found), polarity: Err(found), region: Err(found), exposure: Err(found.into()) }
+    Limits {
+        threshold: Err(found),
+        polarity: Err(found),
+        region: Err(found),
+        exposure: Err(found.into()),
+        pairs: Err(found),
+    }
 }

@@ -4,7 +4,8 @@ use crate::memory::Storage;
 use shared::limits::CapacityError;
 use shared::pipeline::{Finding, Memory, Outcome, Side};
 use shared::wire::{
-    Answer, Capacities, Exposure, Frame, Health, PictureKind, ResetReason, ShapeLists, ToHost, WireError,
+    Answer, Capacities, Exposure, Frame, Health, MAX_FRAME, PairReport, PictureKind, ResetReason, Shape,
+    ShapeLists, ToHost, WireError,
 };
 
 /// Who a device is; see [`shared::wire::Hello`].
@@ -124,6 +125,29 @@ impl Inbox {
             ToHost::Health(health) => Message::Health(health),
             ToHost::Answer(answer) => Message::Answer(answer),
         })
+    }
+
+    /// The frame of the pair that was read last, as its device sent it but for the number of the frame.
+    ///
+    /// # Errors
+    /// None: what came in a frame fits into one.
+    pub fn frame(&mut self, pair: &Pair) -> Result<Vec<u8>, CapacityError> {
+        let memory = self.storage.lend();
+        let report = ToHost::Pair(PairReport {
+            number: pair.number,
+            stamps: pair.stamps,
+            levels: pair.levels,
+            exposures: pair.exposures,
+            result: pair
+                .result
+                .as_ref()
+                .map(|outcome| Shape::of(&memory, outcome))
+                .map_err(|finding| *finding),
+        });
+        let mut frame = vec![0; MAX_FRAME];
+        let length = report.encode(0, &mut frame)?;
+        frame.truncate(length);
+        Ok(frame)
     }
 
     /// The memory that the last shape stands in.

@@ -1,0 +1,13 @@
+"""Prints what live boards send, and keeps their models: python subscribe.py [tcp/127.0.0.1:7447]"""
+import json, pathlib, sys, zenoh
+
+config = zenoh.Config()
+config.insert_json5("mode", '"client"')
+config.insert_json5("scouting/multicast/enabled", "false")
+config.insert_json5("connect/endpoints", json.dumps(sys.argv[1:] or ["tcp/127.0.0.1:7447"]))
+with zenoh.open(config) as session, session.declare_subscriber("ossature/*/*/*") as boards:
+    for sample in boards:
+        told = json.loads(sample.attachment.to_string())
+        print(sample.key_expr, told["number"], told["pair"], len(sample.payload), flush=True)
+        if str(sample.key_expr).endswith("/model"):
+            pathlib.Path(f"{told['run']}-{told['pair']:06}.ply").write_bytes(sample.payload.to_bytes())
