@@ -3,8 +3,8 @@
 #
 #   ./ci.sh            everything
 #   ./ci.sh NAME...    single parts: fmt lint test bench doc firmware v4l2 fuzz; qemu, which test contains;
-#                      supply, which installs tools for minutes and is run where changes are merged; and fleet,
-#                      which builds the optional features, and miri, which are run by hand
+#                      supply, which installs tools for minutes, and fleet, which builds the optional features:
+#                      both are run where changes are merged; and miri, which is run by hand
 #
 # Installs what a fresh Debian machine with rustup lacks. The last line is "N passed, N failed", counting
 # tests, and one for each check that is not made of tests. A part that ran no test fails. Exit codes: 0 all
@@ -168,7 +168,6 @@ part_firmware() {
     check cargo clippy -q -p shared --example sketch --target "$TARGET" --release --locked -- -D warnings
     # As the user builds it, and what it takes.
     check cargo build -q -p firmware --target "$TARGET" --release --locked
-    check same_elsewhere
     # What it takes, and what it is made of: panics, the deepest stack.
     tests cargo test -q --locked -p system-tests --test footprint --test images -- --nocapture
 }
@@ -238,8 +237,12 @@ part_fleet() {
 }
 
 # Third-party code: licences, duplicates and sources (deny.toml), and what each package is made of, as
-# PACKAGE/PACKAGE.cdx.json. Known vulnerabilities need the network: the hosted workflow asks for them.
+# PACKAGE/PACKAGE.cdx.json; and that an image is made of nothing else. Known vulnerabilities need the network: the
+# hosted workflow asks for them.
 part_supply() {
+    board_target
+    check cargo build -q -p firmware --target "$TARGET" --release --locked
+    check same_elsewhere
     local tool
     for tool in cargo-deny cargo-cyclonedx; do
         command -v "$tool" >/dev/null || cargo install -q --locked "$tool"
