@@ -1,7 +1,7 @@
 //! Eight numbers in single precision at once, in what registers a machine has.
 //!
-//! [`Lanes`] tells what holds them, and [`crate::wide::widest`] chooses it. All kinds give the same bits, as no
-//! operation is fused or approximated.
+//! [`Floats`] tells what holds them, and [`crate::wide::widest`] chooses it. All kinds give the same bits, as no
+//! operation is fused or approximated, but for what `min` and `max` do not tell.
 
 use std::ops::{Add, Div, Mul, Sub};
 
@@ -11,7 +11,7 @@ use wide::f32x8;
 pub(crate) const LANES: usize = 8;
 
 /// Eight numbers, or as many masks: what a comparison gives.
-pub(crate) trait Lanes:
+pub(crate) trait Floats:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
     /// Eight numbers from memory.
@@ -26,10 +26,10 @@ pub(crate) trait Lanes:
     /// Square roots; no number of what is negative.
     fn sqrt(self) -> Self;
 
-    /// The lesser of two numbers.
+    /// The lesser of two numbers. Neither may be none; the sign of a zero is not told.
     fn min(self, other: Self) -> Self;
 
-    /// The greater of two numbers.
+    /// The greater of two numbers. Neither may be none; the sign of a zero is not told.
     fn max(self, other: Self) -> Self;
 
     /// Where the first number is less; not if either is none.
@@ -49,7 +49,7 @@ pub(crate) trait Lanes:
 }
 
 /// Any machine's.
-impl Lanes for f32x8 {
+impl Floats for f32x8 {
     #[inline(always)]
     fn load(numbers: &[f32; LANES]) -> Self {
         (*numbers).into()
@@ -113,5 +113,5 @@ pub(crate) trait Work {
 
     /// Does it. To be inlined, with all that it does to lanes: so a compiler may use their registers. Closures on lanes
     /// that are handed to others may not be.
-    fn run<L: Lanes>(self) -> Self::Output;
+    fn run<L: Floats>(self) -> Self::Output;
 }

@@ -1,8 +1,8 @@
 //! Inner loops in the widest registers that this machine has: the core's, and the surface's.
 //!
-//! What a register holds is told by [`Lanes`](shared::lanes::Lanes), and of numbers by `lanes.rs`; the loops are
-//! compiled once more for each width. The only place of the host that is `unsafe`: registers may be used only where
-//! the machine has them.
+//! What a register holds is told by [`Lanes`](shared::lanes::Lanes), and of numbers by `Floats` in `lanes.rs`; the loops are
+//! compiled once more for each width. Only this file and those in `wide/` are `unsafe` in the host: registers may be
+//! used only where the machine has them.
 
 #![expect(unsafe_code, reason = "the compiler cannot know which registers the machine has")]
 
@@ -69,12 +69,14 @@ fn has_avx2() -> bool {
         && is_x86_feature_detected!("popcnt")
 }
 
-/// Does something in the widest lanes of this machine; all make the same bits.
+/// Does something in the widest lanes of floats of this machine ([`Floats`](crate::lanes::Floats), not words as
+/// [`kernels`] do); all make the same bits.
 #[inline]
 pub(crate) fn widest<W: Work>(work: W) -> W::Output {
     #[cfg(all(target_arch = "x86_64", target_pointer_width = "64"))]
     if has_avx2() {
-        return numbers::avx2(work);
+        // SAFETY: the machine has what is asked for.
+        return unsafe { numbers::avx2(work) };
     }
     work.run::<f32x8>()
 }

@@ -156,7 +156,8 @@ fn unsafe_stays_with_registers_and_on_its_list() {
             let mut found = BTreeMap::new();
             count_unsafe(tokens, String::new(), &mut found);
             let name = file.strip_prefix(root()).unwrap().display().to_string();
-            let allowed = ["firmware/src/board", "host/src/wide"].iter().any(|place| name.starts_with(place));
+            let allowed = name == "host/src/wide.rs"
+                || ["firmware/src/board/", "host/src/wide/"].iter().any(|place| name.starts_with(place));
             assert!(allowed || found.is_empty(), "{name} is unsafe");
             list.extend(found.iter().map(|(function, count)| format!("{name} {function} {count}\n")));
         }

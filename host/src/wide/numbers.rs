@@ -1,9 +1,9 @@
-//! Lanes of eight numbers in one register of AVX.
+//! Floats of eight numbers in one register of AVX.
 
 use core::arch::x86_64::*;
 use core::ops::{Add, Div, Mul, Sub};
 
-use crate::lanes::{LANES, Lanes, Work};
+use crate::lanes::{Floats, LANES, Work};
 
 #[derive(Clone, Copy)]
 struct Avx(__m256);
@@ -13,7 +13,7 @@ const _: () = assert!(size_of::<[f32; LANES]>() == size_of::<__m256>());
 /// A function of registers by one instruction.
 macro_rules! by {
     ($instruction:ident($($register:expr),+)) => {
-        // SAFETY: lanes are used below `avx2` only, which runs only where there are such registers.
+        // SAFETY: lanes are used below `avx2` only, whose caller sees to it that there are such registers.
         Self(unsafe { $instruction($($register.0),+) })
     };
 }
@@ -54,7 +54,7 @@ impl Div for Avx {
     }
 }
 
-impl Lanes for Avx {
+impl Floats for Avx {
     #[inline(always)]
     fn load(numbers: &[f32; LANES]) -> Self {
         // SAFETY: as above; and there are as many numbers.
@@ -120,12 +120,15 @@ impl Lanes for Avx {
 }
 
 /// Does something in them.
-pub(super) fn avx2<W: Work>(work: W) -> W::Output {
+///
+/// # Safety
+/// The machine has AVX2, BMI1, BMI2, LZCNT and POPCNT.
+pub(super) unsafe fn avx2<W: Work>(work: W) -> W::Output {
     #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
     fn compiled<W: Work>(work: W) -> W::Output {
         work.run::<Avx>()
     }
-    // SAFETY: `widest` comes here only where there are such registers.
+    // SAFETY: by the caller.
     unsafe { compiled(work) }
 }
 
@@ -134,7 +137,7 @@ mod tests {
     use wide::f32x8;
 
     use super::*;
-    use crate::wide::widest;
+    use crate::wide::{has_avx2, widest};
 
     /// Each operation on numbers of all sorts.
     struct Everything;
@@ -142,7 +145,7 @@ mod tests {
     impl Work for Everything {
         type Output = Vec<u32>;
 
-        fn run<L: Lanes>(self) -> Vec<u32> {
+        fn run<L: Floats>(self) -> Vec<u32> {
             let sorts = [0.0, -0.0, 1.5, -3e38, f32::MIN_POSITIVE, f32::INFINITY, 1.0 / 3.0, -7e-12];
             let numbers = (0..LANES).map(|i| {
                 let (mut a, mut b) = (sorts, sorts);
@@ -171,6 +174,12 @@ mod tests {
 
     #[test]
     fn all_lanes_make_the_same_bits() {
+        if !has_avx2() {
+            let in_ci = std::env::var("CI").is_ok_and(|ci| ci == "true");
+            assert!(!in_ci, "there is no AVX2, and nothing may be skipped");
+            eprintln!("\n!!!! SKIPPED: this machine has no AVX2, so its lanes are NOT compared !!!!\n");
+            return;
+        }
         assert_eq!(widest(Everything), Everything.run::<f32x8>());
     }
 }

@@ -197,7 +197,8 @@ struct Site {
 }
 
 impl Bundle<'_> {
-    /// Where a point near the surface, of which `cone` decides, is clear of it; nothing if it stays where it is. All other cones are at least `others` cubes off.
+    /// Where a point near the surface, of which `cone` decides, is clear of it; nothing if it stays where
+    /// it is. All other cones are at least `others` cubes off.
     fn site(&self, position: Point3<f64>, cone: u32, others: f32, solid: &Solid) -> Option<Site> {
         let (cube, deciding) = (solid.lattice.cube, &solid.distances[cone as usize]);
         let (from_centre, radius) = deciding.nearest_ball(&position);
@@ -221,8 +222,12 @@ impl Bundle<'_> {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::stage::surface::{RoundCone, distance::Distance, lattice::Lattice};
+    use crate::lanes::Floats;
+    use crate::stage::surface::{
+        RoundCone, cone::Cone, distance::Distance, lattice::Lattice, region::reach, vectors::all,
+    };
     use nalgebra::Vector3;
+    use wide::f32x8;
 
     /// Thirty cones in 20 mm, thick and thin, some along the axes.
     pub(in crate::stage::surface) fn cones() -> Vec<RoundCone> {
@@ -294,6 +299,44 @@ pub(super) mod tests {
                 }
             }
             assert!(moved > 100, "{moved}");
+        });
+    }
+
+    #[test]
+    fn each_leaf_lists_the_cones_of_the_surface_in_it() {
+        /// So near to the surface are the places that are looked at, cubes.
+        const NEAR: f64 = 0.02;
+        grown(&cones(), 0.7, |solid, grove| {
+            let cube = solid.lattice.cube;
+            let mut seen = 0;
+            for (block, leaf) in
+                grove.blocks.iter().step_by(5).flat_map(|block| (0..8).map(move |leaf| (block, leaf)))
+            {
+                let middle = solid.middle(Region { corner: block.corner, cubes: SIDE });
+                let of_leaf = solid.middle(Region { corner: block.corner, cubes: SIDE }.octant(leaf));
+                let (groups, places) = grove.touching(block, leaf);
+                let along = |i: i32| f64::from(i - 5) * 0.4;
+                for way in (0..11 * 11 * 11)
+                    .map(|i| Vector3::new(along(i / 121), along(i / 11 % 11), along(i % 11)))
+                    .filter(|way| way.norm() + NEAR < f64::from(reach(2)))
+                {
+                    let p = of_leaf + way * cube;
+                    let nearest =
+                        |p| solid.distances.iter().map(|cone| cone.at(p)).fold(f64::INFINITY, f64::min);
+                    let least = nearest(&p) / cube;
+                    if least.abs() > NEAR {
+                        continue;
+                    }
+                    let offset = ((p - middle) / cube).map(|x| x as f32);
+                    let listed = places.iter().map(|&place| {
+                        Cone::<f32x8>::of(groups, place as usize).at(all(offset.into())).0.store()[0]
+                    });
+                    let listed = f64::from(listed.fold(f32::INFINITY, f32::min));
+                    assert!((listed - least).abs() < 1e-4, "{p} {listed} {least}");
+                    seen += 1;
+                }
+            }
+            assert!(seen > 1000, "{seen}");
         });
     }
 }

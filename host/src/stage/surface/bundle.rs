@@ -12,7 +12,7 @@ use super::{
     vectors::{Vectors, all, load, plus},
 };
 use crate::{
-    lanes::{LANES, Lanes, Work},
+    lanes::{Floats, LANES, Work},
     wide::widest,
 };
 
@@ -63,7 +63,7 @@ pub(super) struct Leaves {
     /// Those in which the surface does not pass, and those whose middle is inside.
     pub(super) whole: u32,
     pub(super) inside: u32,
-    /// How far the centres of the balls are from the middles of the leaves at most, cubes.
+    /// How far, of all cones of the block, the centres of the balls are from the middles of the leaves at most, cubes.
     furthest: [f32; LANES],
 }
 
@@ -98,7 +98,7 @@ impl Bundle<'_> {
     }
 
     /// What the cones at `places` say about the points of a leaf. Those within `clear` cubes of the surface, to
-    /// within rounding, are near.
+    /// within rounding, are near; rounding is that of the cone of the block whose ball is furthest from the leaf.
     pub(super) fn nearest_of_sites(&self, leaf: usize, leaves: &Leaves, places: &[u32], clear: f32) -> Sites {
         let rounding = (leaves.furthest[leaf] + 4.0) * 8.0 * ROUNDING;
         widest(AskSites { bundle: self, leaf, places, clear, rounding })
@@ -128,7 +128,7 @@ impl Work for AskLeaves<'_> {
     type Output = Leaves;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> Leaves {
+    fn run<L: Floats>(self) -> Leaves {
         let mut nearest = [L::splat(f32::INFINITY); 2];
         let mut furthest = L::splat(0.0);
         self.apart.clear();
@@ -171,7 +171,7 @@ impl Work for AskSites<'_> {
     type Output = Sites;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> Sites {
+    fn run<L: Floats>(self) -> Sites {
         let middle = all([0, 1, 2].map(|axis| LEAVES[axis][self.leaf]));
         let offsets: [Vectors<L>; KINDS] = [plus(load(&OFFSETS[0]), middle), plus(load(&OFFSETS[1]), middle)];
         let mut nearest = [L::splat(f32::INFINITY); KINDS];
@@ -212,7 +212,7 @@ impl Work for Nearest<'_> {
     type Output = f32;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> f32 {
+    fn run<L: Floats>(self) -> f32 {
         let offset = all::<L>(self.offset);
         let mut least = L::splat(f32::INFINITY);
         for group in self.groups {
@@ -220,5 +220,33 @@ impl Work for Nearest<'_> {
             least = (square.sqrt() - radius).min(least);
         }
         least.store().into_iter().fold(f32::INFINITY, f32::min)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stage::surface::{block::tests::cones, cone::prepare, distance::Distance};
+
+    #[test]
+    fn all_lanes_say_the_same_about_leaves() {
+        let distances: Vec<Distance> = cones().iter().map(Distance::to).collect();
+        let cones: Vec<u32> = (0..distances.len() as u32).collect();
+        for cube in [0.5, 0.7, 3.0] {
+            let (mut groups, middle) = (Vec::new(), Point3::new(8.0, 7.0, 6.0));
+            prepare(&cones, &distances, &middle, cube, &mut groups);
+            let bundle = &Bundle { cones: &cones, groups: &groups, middle };
+            let ask = |is_widest| {
+                let (mut apart, mut touching) = (Vec::new(), Vec::new());
+                let asked = AskLeaves { bundle, clear: 0.12, apart: &mut apart, touching: &mut touching };
+                let leaves = if is_widest { widest(asked) } else { asked.run::<wide::f32x8>() };
+                let distances = apart.as_flattened().as_flattened().iter().map(|x| x.to_bits());
+                let touching: Vec<_> =
+                    touching.iter().map(|touching| [touching.points, touching.leaves]).collect();
+                let furthest = leaves.furthest.map(f32::to_bits);
+                (distances.collect::<Vec<_>>(), touching, leaves.whole, leaves.inside, furthest)
+            };
+            assert_eq!(ask(true), ask(false), "{cube}");
+        }
     }
 }

@@ -9,7 +9,7 @@ use super::{
     distance::Distance,
     vectors::{Vectors, dot, less, load, plus},
 };
-use crate::lanes::{LANES, Lanes};
+use crate::lanes::{Floats, LANES};
 
 /// So far off, in cubes, is what fills the last group.
 const NOWHERE: f32 = 1e15;
@@ -75,7 +75,7 @@ impl Group {
     /// As seen from the centres of the balls that decide the distances of a point at `offset` from the middle: the
     /// point, the squares of how far that is, and the radii.
     #[inline(always)]
-    pub(super) fn balls<L: Lanes>(&self, offset: Vectors<L>) -> (Vectors<L>, L, L) {
+    pub(super) fn balls<L: Floats>(&self, offset: Vectors<L>) -> (Vectors<L>, L, L) {
         let p = plus(load(&self.middle), offset);
         let radius = L::load(&self.radius);
         if self.are_balls {
@@ -117,7 +117,7 @@ pub(super) struct Cone<L> {
     pub(super) is_ball: bool,
 }
 
-impl<L: Lanes> Cone<L> {
+impl<L: Floats> Cone<L> {
     /// The cone at a place in the list.
     #[inline(always)]
     pub(super) fn of(groups: &[Group], place: usize) -> Self {
@@ -159,7 +159,7 @@ impl<L: Lanes> Cone<L> {
 /// The square of how far a point is from the centre of the ball that decides its distance, and where on the
 /// axis that is; from where the point is along the axis, and the square of how far away from it.
 #[inline(always)]
-pub(super) fn nearest_ball<L: Lanes>(along: L, away: L, [low, high, lean]: [L; 3]) -> (L, L) {
+pub(super) fn nearest_ball<L: Floats>(along: L, away: L, [low, high, lean]: [L; 3]) -> (L, L) {
     let s = (along + lean * away.sqrt()).min(high).max(low);
     let short = along - s;
     (short * short + away, s)

@@ -6,7 +6,7 @@ use super::{
     patch::{Blocks, Cut},
     vectors::{Vectors, load},
 };
-use crate::lanes::{LANES, Lanes, Work};
+use crate::lanes::{Floats, LANES, Work};
 
 /// Cubes that a block sees.
 const CUBES: usize = 5 * 5 * 5;
@@ -104,7 +104,7 @@ impl Points {
 
     /// Where one of the ends of edges stand, from the block's middle, in cubes.
     #[inline(always)]
-    pub(super) fn at<L: Lanes>(&self, ends: &[[u8; 2]; LANES], end: usize) -> Vectors<L> {
+    pub(super) fn at<L: Floats>(&self, ends: &[[u8; 2]; LANES], end: usize) -> Vectors<L> {
         let mut positions = [[0.0; LANES]; 3];
         for (axis, along) in self.along.iter().enumerate() {
             for (lane, ends) in ends.iter().enumerate() {
@@ -153,7 +153,8 @@ impl Numbers {
     }
 }
 
-/// Fills in the numbers of a block's vertices and of those ahead of it; what is on no edge that is cut stays what it is.
+/// Fills in the numbers of a block's vertices and of those ahead of it; what is on no edge that is cut stays what it
+/// is.
 pub(super) struct FillNumbers<'a> {
     pub(super) cuts: &'a [Option<&'a Cut>; 8],
     pub(super) numbers: &'a mut Numbers,
@@ -163,7 +164,7 @@ impl Work for FillNumbers<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run<L: Lanes>(self) {
+    fn run<L: Floats>(self) {
         for (ahead, cut) in self.cuts.iter().enumerate() {
             let Some(cut) = cut else { continue };
             for (direction, numbers) in self.numbers.0.chunks_exact_mut(CUBES).enumerate() {

@@ -12,7 +12,7 @@ use super::{
     lattice::{Corner, EDGES, ENDS, Edge, TETRAHEDRA, Tetrahedron, seen_ahead},
     near::{Numbers, PLACES},
 };
-use crate::lanes::{Lanes, Work};
+use crate::lanes::{Floats, Work};
 
 /// For each set of corners inside (bit i is corner i) the corners in an order that keeps the orientation
 /// and begins with the fewer: those inside, or for three the one outside.
@@ -81,7 +81,7 @@ impl Work for Count<'_> {
     type Output = Cut;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> Cut {
+    fn run<L: Floats>(self) -> Cut {
         let inside = inside(self.blocks);
         let (mut edges, mut first, mut vertices) = ([0; EDGES], [0; EDGES], 0);
         for (direction, [a, b]) in ENDS.iter().enumerate() {
@@ -119,7 +119,7 @@ impl Work for PutFaces<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run<L: Lanes>(self) {
+    fn run<L: Floats>(self) {
         let inside = inside(self.blocks);
         let mut faces = self.faces.iter_mut();
         let mut put = |face| *faces.next().expect("a place for each face") = face;

@@ -21,7 +21,7 @@ use super::{
     vectors::{Vectors, all, dot, less, load, plus, store, times},
 };
 use crate::{
-    lanes::{LANES, Lanes, Work},
+    lanes::{Floats, LANES, Work},
     wide::widest,
 };
 
@@ -71,7 +71,7 @@ impl Work for Prune<'_> {
     type Output = bool;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> bool {
+    fn run<L: Floats>(self) -> bool {
         let Self { bundle, around: Around { offset, reach, margin }, answers, kept } = self;
         if bundle.cones.is_empty() {
             return false;
@@ -123,7 +123,7 @@ impl Work for Prune<'_> {
 
 /// What the cones of a group answer about a point.
 #[inline(always)]
-fn ask<L: Lanes>(group: &Group, offset: Vectors<L>) -> Answer {
+fn ask<L: Floats>(group: &Group, offset: Vectors<L>) -> Answer {
     let (from_centre, square, radius) = group.balls(offset);
     let far = square.sqrt();
     let scale = L::splat(1.0) / far.max(L::splat(f32::MIN_POSITIVE));
@@ -142,7 +142,7 @@ struct Least<L> {
     groups: L,
 }
 
-impl<L: Lanes> Least<L> {
+impl<L: Floats> Least<L> {
     #[inline(always)]
     fn none() -> Self {
         Self { least: L::splat(f32::INFINITY), groups: L::splat(0.0) }
@@ -176,7 +176,7 @@ impl Rival {
 impl Answer {
     /// About the distances of a point that is `way` from the middle, `reach` in length.
     #[inline(always)]
-    fn ahead<L: Lanes>(&self, way: Vectors<L>, reach: f32) -> L {
+    fn ahead<L: Floats>(&self, way: Vectors<L>, reach: f32) -> L {
         let uphill = dot(load(&self.gradient), way);
         let across = L::splat(reach * reach) - uphill * uphill;
         let from_centre = L::load(&self.from_centre);
@@ -186,7 +186,7 @@ impl Answer {
 
 /// Compares by the way, and by tangents: positive where the rival is nearer everywhere.
 #[inline(always)]
-fn by_distance<L: Lanes>(answer: &Answer, rival: Rival, reach: f32) -> L {
+fn by_distance<L: Floats>(answer: &Answer, rival: Rival, reach: f32) -> L {
     let from_centre = L::load(&answer.from_centre);
     let turned = less(load(&answer.gradient), all(rival.gradient), L::splat(1.0));
     let tangent =
@@ -200,7 +200,7 @@ fn by_distance<L: Lanes>(answer: &Answer, rival: Rival, reach: f32) -> L {
 
 /// Compares all cones with a rival by the squares of distances to centres.
 #[inline(always)]
-fn compare<L: Lanes>(bundle: &Bundle, answers: &mut [Answer], rival: Rival, offset: Vectors<L>, reach: f32) {
+fn compare<L: Floats>(bundle: &Bundle, answers: &mut [Answer], rival: Rival, offset: Vectors<L>, reach: f32) {
     for (answer, group) in answers.iter_mut().zip(bundle.groups) {
         answer.beaten = L::load(&answer.beaten).max(by_ball(group, rival, offset, reach)).store();
     }
@@ -208,7 +208,7 @@ fn compare<L: Lanes>(bundle: &Bundle, answers: &mut [Answer], rival: Rival, offs
 
 /// Compares the balls of one end of each cone by the squares of distances to centres.
 #[inline(always)]
-fn end_by_ball<L: Lanes>(group: &Group, end: L, rival: Rival, offset: Vectors<L>, reach: f32) -> L {
+fn end_by_ball<L: Floats>(group: &Group, end: L, rival: Rival, offset: Vectors<L>, reach: f32) -> L {
     let far = L::splat(rival.from_centre);
     let square = far * far;
     // Never infinite, as nothing times that is no number; and still more than any way across the region.
@@ -227,7 +227,7 @@ fn end_by_ball<L: Lanes>(group: &Group, end: L, rival: Rival, offset: Vectors<L>
 
 /// Compares by the squares of distances to centres: positive where the rival is nearer everywhere.
 #[inline(always)]
-fn by_ball<L: Lanes>(group: &Group, rival: Rival, offset: Vectors<L>, reach: f32) -> L {
+fn by_ball<L: Floats>(group: &Group, rival: Rival, offset: Vectors<L>, reach: f32) -> L {
     let low = end_by_ball(group, L::load(&group.low), rival, offset, reach);
     if group.are_balls {
         return low;

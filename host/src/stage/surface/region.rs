@@ -3,7 +3,7 @@
 use nalgebra::Point3;
 
 use super::{
-    block::EDGE,
+    block::{CLEAR, EDGE},
     bundle::Bundle,
     cone::{Group, prepare},
     distance::Distance,
@@ -70,8 +70,8 @@ pub(super) struct Around {
     pub(super) offset: [f32; 3],
     /// How far all that belongs to it is from its middle, cubes.
     pub(super) reach: f32,
-    /// How near to it cones are kept, cubes: of a block those that touch it, and above those that tell which blocks
-    /// there are.
+    /// How near to it cones are kept, cubes: of a block those that touch it or come so near that a point at its rim is
+    /// not clear of them, and above those that tell which blocks there are.
     pub(super) margin: f32,
 }
 
@@ -90,7 +90,7 @@ impl Octant {
 
     pub(super) fn of(parent: Region, octant: usize) -> Self {
         let region = parent.octant(octant);
-        let margin = if region.cubes == SIDE { 0.0 } else { EDGE };
+        let margin = if region.cubes == SIDE { CLEAR as f32 } else { EDGE };
         let quarter = parent.cubes as f32 / 4.0;
         let offset = [0, 1, 2].map(|axis| if octant >> (2 - axis) & 1 == 1 { quarter } else { -quarter });
         Self { region, around: Around { offset, reach: reach(region.cubes), margin } }
