@@ -19,5 +19,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     // Nobody looks on: `()`. A `report::record::Record` in its place keeps what every stage made.
     let model = reconstruct(left, right, &camera, &Options::default(), &mut ())?;
     println!("{} faces, {:.1} cm3", model.mesh.faces.len(), model.mesh.volume() / 1000.0);
-    Ok(export::write(Path::new(output), &model.mesh.into())?)
+    export::write(Path::new(output), &model.mesh.into())?;
+    Ok(())
 }

@@ -39,6 +39,8 @@ pub struct Reconstruction {
     pub mesh: Mesh,
     /// What was measured of its visible side, if that was asked for.
     pub front: Option<Measured>,
+    /// Why it was not measured, if that was asked for.
+    pub unmeasured: Option<Unmeasured>,
     /// Its curve skeleton with radii.
     pub skeleton: Curves,
     /// Its boundary as seen from the left.
@@ -57,6 +59,15 @@ pub struct Reconstruction {
     pub dropped: (usize, f64),
     /// Time of each host stage.
     pub times: Vec<(&'static str, Duration)>,
+}
+
+/// Why the visible side of what a device has sent is from balls, though it was to be measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unmeasured {
+    /// Its pictures did not come with it, or not whole.
+    NoPictures,
+    /// Pictures came, but by their size or the object's area they are not those of the shape.
+    OtherPictures,
 }
 
 /// Why there is no model.

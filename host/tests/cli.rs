@@ -561,6 +561,25 @@ fn help_shows_how() {
 }
 
 #[test]
+fn convert_says_what_a_format_has_no_place_for() {
+    let folder = TempDir::new().unwrap();
+    let known = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+                 property float confidence\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
+                 0 0 0 1\n1 0 0 1\n0 1 0 1\n3 0 1 2\n";
+    fs::write(folder.path().join("a.ply"), known).unwrap();
+    let left_out = |output: &str| {
+        let told = json(&good(folder.path(), &["convert", "a.ply", output, "--json"]));
+        (told["left_out"].clone(), good(folder.path(), &["convert", "a.ply", output]).contains("left out"))
+    };
+    for output in ["b.stl", "b.obj"] {
+        assert_eq!(left_out(output), ("confidence".into(), true), "{output}");
+    }
+    for output in ["b.ply", "b.glb"] {
+        assert_eq!(left_out(output), (Value::Null, false), "{output}");
+    }
+}
+
+#[test]
 fn every_command_has_a_manual_page() {
     let folder = TempDir::new().unwrap();
     good(folder.path(), &["man", "pages"]);
@@ -578,7 +597,7 @@ fn every_command_has_a_manual_page() {
 #[test]
 fn experiments_leave_a_page_its_figures_and_their_numbers() {
     let folder = TempDir::new().unwrap();
-    let told = json(&good(folder.path(), &["experiments", "--quick", "--json"]));
+    let told = json(&good(folder.path(), &["experiments", "--quick", "--front", "auto", "--json"]));
     let left = folder.path().join("ossature-experiments");
     assert_eq!(json(&fs::read_to_string(left.join("experiments.json")).unwrap()), told);
     let mut names: Vec<_> = fs::read_dir(&left).unwrap().map(|e| e.unwrap().file_name()).collect();
@@ -586,6 +605,8 @@ fn experiments_leave_a_page_its_figures_and_their_numbers() {
     assert_eq!(names, ["animal", "experiments.json", "experiments.md", "figures", "torus", "torus_noise"]);
     // Every file that the page shows is there.
     let page = fs::read_to_string(left.join("experiments.md")).unwrap();
+    assert_eq!(told["front"], "auto");
+    assert!(page.contains("measured in the grey levels"));
     let links: Vec<_> =
         page.split("](").skip(1).map(|rest| rest.split(')').next().unwrap_or_default()).collect();
     assert!(links.len() > 15, "{links:?}");

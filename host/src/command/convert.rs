@@ -62,11 +62,9 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         ("nurbs", ("control_points", controls), ("curves", curves.len()))
     } else {
         let geometry = read_geometry(&input)?;
-        export::write(&args.output, &geometry)?;
+        left_out = export::write(&args.output, &geometry)?;
         match &geometry {
-            Geometry::Mesh { mesh, confidence } => {
-                left_out = Some("confidence")
-                    .filter(|_| !confidence.is_empty() && !export::holds_confidence(&args.output));
+            Geometry::Mesh { mesh, .. } => {
                 ("mesh", ("vertices", mesh.vertices.len()), ("faces", mesh.faces.len()))
             }
             Geometry::Curves(curves) => {

@@ -193,13 +193,7 @@ pub(super) fn receive(
     let made = made.map_err(|refusal| place.refused(options, record, refusal))?;
     let calibration = &model.into();
     let run = Run { calibration, options, reconstruction: &made, record, truth: None };
-    let mut written = Model::written(place, &run, start)?;
-    if options.front != Front::Balls && made.front.is_none() {
-        written
-            .warnings
-            .push("its pictures did not come with it, so that its visible side is from balls".into());
-    }
-    Ok((written, made))
+    Ok((Model::written(place, &run, start)?, made))
 }
 
 impl Model {
@@ -238,6 +232,7 @@ impl Model {
 /// Everything that the user should know about a reconstruction, in words.
 pub(super) fn warnings(made: &Reconstruction) -> Vec<String> {
     let mut warnings: Vec<String> = made.outcome.findings.iter().map(words::sentence).collect();
+    warnings.extend(made.unmeasured.map(|why| words::unmeasured(why).to_owned()));
     let (bodies, share) = made.dropped;
     if bodies > 0 {
         let pieces = count(bodies, "loose piece", "loose pieces");

@@ -53,23 +53,28 @@ pub enum ExportError {
     },
 }
 
-/// Writes a geometry in the format that the file's extension names: `ply`, `stl`, `obj`, `glb` or `swc`. The confidence
-/// of vertices is left out unless [`holds_confidence`].
+/// Writes a geometry in the format that the file's extension names: `ply`, `stl`, `obj`, `glb` or `swc`. Returns
+/// what the format has no place for: the `confidence` of vertices, if they have one.
 ///
 /// # Errors
 ///
 /// If the extension is none of these, the format cannot hold this geometry, or the file cannot be written.
-pub fn write(path: &Path, geometry: &Geometry) -> Result<(), ExportError> {
+pub fn write(path: &Path, geometry: &Geometry) -> Result<Option<&'static str>, ExportError> {
     let extension = path.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase);
     let refuse = |what: &str| Err(ExportError::Content { path: path.to_path_buf(), what: what.to_owned() });
-    match (extension.as_deref(), geometry) {
+    let left_out = |confidence: &[f64]| (!confidence.is_empty()).then_some("confidence");
+    let written = match (extension.as_deref(), geometry) {
         (Some("ply"), Geometry::Mesh { mesh, confidence }) => {
             let known = [("confidence", &confidence[..])];
             ply::write_known_mesh(path, mesh, if confidence.is_empty() { &[] } else { &known }, &[TITLE])
         }
         (Some("ply"), Geometry::Curves(curves)) => ply::write_curves(path, curves, &[TITLE]),
-        (Some("stl"), Geometry::Mesh { mesh, .. }) => stl::write_mesh(path, mesh),
-        (Some("obj"), Geometry::Mesh { mesh, .. }) => obj::write_mesh(path, mesh),
+        (Some("stl"), Geometry::Mesh { mesh, confidence }) => {
+            return stl::write_mesh(path, mesh).map(|()| left_out(confidence));
+        }
+        (Some("obj"), Geometry::Mesh { mesh, confidence }) => {
+            return obj::write_mesh(path, mesh).map(|()| left_out(confidence));
+        }
         (Some("obj"), Geometry::Curves(curves)) => obj::write_curves(path, curves),
         (Some("glb"), Geometry::Mesh { mesh, confidence }) => glb::write_mesh(path, mesh, confidence),
         (Some("glb"), Geometry::Curves(curves)) => glb::write_curves(path, curves),
@@ -80,13 +85,8 @@ pub fn write(path: &Path, geometry: &Geometry) -> Result<(), ExportError> {
             refuse("JSON holds NURBS alone, which a folder of results has, or its report.json")
         }
         _ => refuse("its name must end in .ply, .stl, .obj, .glb, .swc or .json"),
-    }
-}
-
-/// Whether the format that the file's extension names holds the confidence of vertices.
-#[must_use]
-pub fn holds_confidence(path: &Path) -> bool {
-    ["ply", "glb"].iter().any(|extension| has_extension(path, extension))
+    };
+    written.map(|()| None)
 }
 
 /// Writes NURBS, which JSON alone holds with their radii.

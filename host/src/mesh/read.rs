@@ -112,7 +112,13 @@ fn bytes_of(path: &Path) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-fn sound(geometry: Geometry) -> Result<Geometry, String> {
+fn sound(mut geometry: Geometry) -> Result<Geometry, String> {
+    if let Geometry::Mesh { mesh, confidence } = &mut geometry
+        && (confidence.len() != mesh.vertices.len() || !confidence.iter().all(|c| (0.0..=1.0).contains(c)))
+    {
+        // What others call so may be anything: it is not known then.
+        confidence.clear();
+    }
     let (points, elements, element) = match &geometry {
         Geometry::Mesh { mesh, .. } if mesh.faces.is_empty() => return Err("it has no faces".into()),
         Geometry::Mesh { mesh, .. } => (&mesh.vertices, mesh.faces.as_flattened(), "triangle"),
@@ -120,12 +126,6 @@ fn sound(geometry: Geometry) -> Result<Geometry, String> {
     };
     if let Some(vertex) = points.iter().position(|p| p.iter().any(|x| !(*x as f32).is_finite())) {
         return Err(format!("a coordinate of vertex {vertex} is not a finite number"));
-    }
-    if let Geometry::Mesh { confidence, .. } = &geometry {
-        let whole = confidence.is_empty() || confidence.len() == points.len();
-        if !whole || confidence.iter().any(|value| !value.is_finite()) {
-            return Err("a confidence is missing or not a finite number".into());
-        }
     }
     if let Geometry::Curves(curves) = &geometry {
         if points.is_empty() {
@@ -165,6 +165,26 @@ mod tests {
         assert!(told("a.ply", b"").starts_with("F/a.ply is no sound mesh: "));
         assert!(told("a.stl", b"").starts_with("F/a.stl is no sound mesh: "));
         assert!(read(&folder.path().join("none.ply")).unwrap_err().to_string().starts_with("cannot read "));
+    }
+
+    #[test]
+    fn what_is_no_confidence_of_ours_is_left_out() {
+        let known = |values: [&str; 3]| {
+            let [a, b, c] = values;
+            let text = format!(
+                "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+                 property float confidence\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
+                 0 0 0 {a}\n1 0 0 {b}\n0 1 0 {c}\n3 0 1 2\n"
+            );
+            match parse(Path::new("a.ply"), text.as_bytes()).unwrap() {
+                Geometry::Mesh { confidence, .. } => confidence,
+                Geometry::Curves(_) => panic!("it has a face"),
+            }
+        };
+        assert_eq!(known(["0", "0.5", "1"]), [0.0, 0.5, 1.0]);
+        for other in ["nan", "-0.1", "255"] {
+            assert!(known(["0", other, "1"]).is_empty(), "{other}");
+        }
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::grow::Described;
 use super::options::{core_settings, settings};
-use super::{Clock, Front, Growth, Mode, Options, Reconstruction, Refusal, grey, optics};
+use super::{Clock, Front, Growth, Mode, Options, Reconstruction, Refusal, Unmeasured, grey, optics};
 use crate::calibration::StereoCamera;
 use crate::memory::Storage;
 use crate::mesh::Mesh;
@@ -81,7 +81,7 @@ impl Workspace {
         let solid = self.solid(views, calibration, options, observer)?;
         let resampled = take(&mut self.images);
         let images = if solid.resampled { resampled.each_ref() } else { views };
-        let made = self.finish(solid, Some(images), options);
+        let made = self.finish(solid, Ok(images), options);
         self.images = resampled;
         made
     }
@@ -105,27 +105,29 @@ impl Workspace {
         self.clock.lap("core");
         let solid = Solid { outcome, camera: model.into(), resampled: model.eyes.is_some() };
         grow(&mut self.growth, memory, &solid, options, &mut self.clock)?;
-        let images = match seen.filter(|_| options.front != Front::Balls) {
-            Some(seen) => self.see(seen, &solid.outcome, model, options)?,
-            None => None,
+        let images = match seen {
+            Some(seen) if options.front != Front::Balls => {
+                self.see(seen, &solid.outcome, model, options).ok_or(Unmeasured::OtherPictures)
+            }
+            _ => Err(Unmeasured::NoPictures),
         };
-        self.finish(solid, images.as_ref().map(<[_; 2]>::each_ref), options)
+        self.finish(solid, images.as_ref().map(<[_; 2]>::each_ref).map_err(|why| *why), options)
     }
 
-    /// The rectified pictures of a shape, with their masks in the core's memory; nothing if the object in them has
-    /// not the areas that the device found.
+    /// The rectified pictures of a shape, with their masks in the core's memory; nothing if they are none of its
+    /// device's, or the object in them has not the areas that it found.
     fn see(
         &mut self,
         seen: Seen,
         outcome: &Outcome,
         model: &PairModel,
         options: &Options,
-    ) -> Result<Option<[GrayImage; 2]>, Refusal> {
+    ) -> Option<[GrayImage; 2]> {
         let size = (u32::from(model.width), u32::from(model.height));
         if seen.pictures.iter().any(|picture| picture.dimensions() != size) {
-            return Ok(None);
+            return None;
         }
-        let images = device_images(model, seen.pictures)?;
+        let images = device_images(model, seen.pictures).ok()?;
         for side in [Side::Left, Side::Right] {
             let threshold = Threshold::Fixed(seen.levels[side as usize]);
             // The level is told, but not on which side of it the object is.
@@ -138,11 +140,11 @@ impl Workspace {
                     })
             });
             if !found {
-                return Ok(None);
+                return None;
             }
         }
         self.clock.lap("rectify");
-        Ok(Some(images))
+        Some(images)
     }
 
     /// The solid of a pair, without its surface.
@@ -188,7 +190,7 @@ impl Workspace {
     fn finish(
         &mut self,
         solid: Solid,
-        images: Option<[&GrayImage; 2]>,
+        images: Result<[&GrayImage; 2], Unmeasured>,
         options: &Options,
     ) -> Result<Reconstruction, Refusal> {
         let Solid { outcome, camera, resampled } = solid;
@@ -199,16 +201,17 @@ impl Workspace {
         self.mesher.surface(cones, cell, &mut self.mesh)?;
         let dropped = self.bodies.keep_largest(&mut self.mesh);
         self.clock.lap("surface");
-        let measured = match (options.front, images) {
-            (Front::Balls, _) | (_, None) => None,
-            (_, Some(images)) => {
+        let (measured, unmeasured) = match (options.front, images) {
+            (Front::Balls, _) => (None, None),
+            (_, Err(why)) => (None, Some(why)),
+            (_, Ok(images)) => {
                 let masks = self.storage.masks().map_err(Finding::from)?;
                 let rows = f64::from(outcome.vertical_offset) / 256.0;
                 let sight = Sight { images, masks, camera: &camera, rows };
                 let measured =
                     front::measure(&self.pool, &mut self.mesh, &sight, options.front == Front::Auto);
                 self.clock.lap("front");
-                Some(measured)
+                (Some(measured), None)
             }
         };
         let turned = |points: &mut [Point3<f64>]| {
@@ -220,6 +223,7 @@ impl Workspace {
         Ok(Reconstruction {
             mesh: take(&mut self.mesh),
             front: measured,
+            unmeasured,
             skeleton: take(&mut self.growth.skeleton),
             boundary: take(&mut self.growth.boundary),
             outcome,

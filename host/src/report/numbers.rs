@@ -13,7 +13,7 @@ mod matching;
 use super::times::{Part, stages};
 use super::{Run, words};
 use crate::curves::spline::Spline;
-use crate::reconstruct::{Mode, Refusal};
+use crate::reconstruct::{Mode, Reconstruction, Refusal, Unmeasured};
 use choices::{Calibration, Choices, Images};
 use curves::Curve;
 use eye::EyeFigures;
@@ -71,12 +71,23 @@ pub(super) struct Gate {
 }
 
 impl Gate {
+    /// Everything that was found about a model.
+    pub(super) fn all(made: &Reconstruction) -> Vec<Self> {
+        let findings = made.outcome.findings.iter().map(Self::of);
+        findings.chain(made.unmeasured.map(Self::unmeasured)).collect()
+    }
+
     pub(super) fn of(finding: &Finding) -> Self {
         Self {
             name: words::name(finding),
             severity: if finding.refuses() { "refusal" } else { "warning" },
             sentence: words::sentence(finding),
         }
+    }
+
+    /// What is no finding of the core, but leaves a part of the model to balls.
+    fn unmeasured(why: Unmeasured) -> Self {
+        Self { name: "unmeasured", severity: "warning", sentence: words::unmeasured(why).into() }
     }
 
     /// What is no finding of the core, but leaves no model either.
@@ -177,7 +188,7 @@ pub fn json(run: &Run<'_>) -> Vec<u8> {
         calibration: Calibration::of(run),
         eyes: Eyes::of([EyeFigures::of(&eyes[0].parts), EyeFigures::of(&eyes[1].parts)]),
         matching: Matching::of(run),
-        gates: run.reconstruction.outcome.findings.iter().map(Gate::of).collect(),
+        gates: Gate::all(run.reconstruction),
         model: Model::of(run),
         front: Front::of(run),
         curves: Eyes::of([Curve::all(&eyes[0].parts), Curve::all(&eyes[1].parts)]),

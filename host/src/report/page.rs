@@ -69,7 +69,7 @@ impl Content {
         let pair = Pair::of(run.record, run.options.mode, outcome.vertical_offset);
         let views = Views::of(&pair, Frame::of(&pair.views, pair.offset), &SHOWN);
         Self {
-            gates: outcome.findings.iter().map(Gate::of).collect(),
+            gates: Gate::all(run.reconstruction),
             space: Some(Space::of(run)),
             report: serde_json::from_slice(report).unwrap_or_default(),
             ..Self::before(title, &pair, views, (run.record, times::stages(run)))

@@ -1,6 +1,7 @@
 //! Words for people and for machines: findings as sentences that say what is wrong and what to do, and
 //! the names by which choices are given and reported.
 
+use crate::reconstruct::Unmeasured;
 use crate::stage::balls::px;
 use shared::fixed::ONE;
 use shared::pipeline::{Finding, Side};
@@ -102,6 +103,17 @@ pub const fn view(side: &Side) -> &'static str {
     match side {
         Side::Left => "left",
         Side::Right => "right",
+    }
+}
+
+/// One sentence about a visible side that was to be measured and is from balls.
+#[must_use]
+pub const fn unmeasured(why: Unmeasured) -> &'static str {
+    match why {
+        Unmeasured::NoPictures => "its pictures did not come with it, so that its visible side is from balls",
+        Unmeasured::OtherPictures => {
+            "the pictures that came with it show another object than its shape, so that its visible side is from balls"
+        }
     }
 }
 

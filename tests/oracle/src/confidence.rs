@@ -30,15 +30,24 @@ pub fn vertices(made: &Reconstruction, truth: &Mesh) -> Vec<Vertex> {
     made.mesh.vertices.par_iter().zip(&front.confidence).map(vertex).collect()
 }
 
-/// The mean error of the least confident fifth over that of the most confident one: of all vertices, and of the
-/// visible ones.
+/// The mean error of the least confident fifth over that of the most confident one, of all vertices and of the visible
+/// ones. The fifths are cut within each model, and errors count as parts of its mean error: so it does not matter which
+/// model is the worse one.
 #[must_use]
-pub fn ratios(vertices: &[Vertex]) -> [f64; 2] {
-    let ratio = |mut vertices: Vec<Vertex>| {
-        vertices.sort_by(|a, b| a.confidence.total_cmp(&b.confidence));
-        let fifth = vertices.len() / 5;
-        let sum = |part: &[Vertex]| part.iter().map(|vertex| vertex.error).sum::<f64>();
-        sum(&vertices[..fifth]) / sum(&vertices[vertices.len() - fifth..])
+pub fn ratios(models: &[&[Vertex]]) -> [f64; 2] {
+    let all = |_: &&Vertex| true;
+    let visible = |vertex: &&Vertex| vertex.visible;
+    let ratio = |counts: &dyn Fn(&&Vertex) -> bool| {
+        let (mut least, mut most) = (0.0, 0.0);
+        for model in models {
+            let mut model: Vec<_> = model.iter().filter(counts).collect();
+            model.sort_by(|a, b| a.confidence.total_cmp(&b.confidence));
+            let mean = |part: &[&Vertex]| part.iter().map(|v| v.error).sum::<f64>() / part.len() as f64;
+            let (fifth, of) = (model.len() / 5, mean(&model));
+            least += mean(&model[..fifth]) / of;
+            most += mean(&model[model.len() - fifth..]) / of;
+        }
+        least / most
     };
-    [ratio(vertices.to_vec()), ratio(vertices.iter().copied().filter(|vertex| vertex.visible).collect())]
+    [ratio(&all), ratio(&visible)]
 }

@@ -17,6 +17,8 @@ pub struct Look {
     sensors: [Sensor; 2],
     /// Standard deviation of the noise, grey levels.
     noise: f64,
+    /// Of the left eye's noise; the right eye's is the next one.
+    pub seed: u64,
     /// How much lower the right eye sees everything, px.
     lower: f64,
 }
@@ -25,7 +27,7 @@ impl Look {
     /// A dull object without marks, in good light.
     pub fn matte() -> Self {
         let sensors = [Sensor::default(); 2];
-        Self { name: "matte", material: Material::default(), sensors, noise: 0.0, lower: 0.0 }
+        Self { name: "matte", material: Material::default(), sensors, noise: 0.0, seed: 1, lower: 0.0 }
     }
 
     /// Every way.
@@ -67,7 +69,7 @@ impl Look {
         let images = photograph(mesh, self.material, &cameras);
         let mut images: [GrayImage; 2] = images.try_into().expect("one image a camera");
         if self.noise > 0.0 {
-            for (image, seed) in images.iter_mut().zip(1..) {
+            for (image, seed) in images.iter_mut().zip(self.seed..) {
                 Noise { sigma: self.noise, salt_and_pepper: 0.0, seed }.apply(image);
             }
         }

@@ -12,7 +12,7 @@ use crate::command::view::{self, Beside};
 use crate::command::{Failure, note, say, words_of};
 use crate::live::View;
 use crate::live::control::Control;
-use crate::reconstruct::{Options, Workspace};
+use crate::reconstruct::{Front, Options, Workspace};
 use crate::report::record::Record;
 use crate::source::serial::inbox::{Hello, Inbox, Message, Pair};
 use crate::source::serial::mosaic::Mosaic;
@@ -201,7 +201,7 @@ impl<'a> Desk<'a> {
     pub(super) fn take(&mut self, inbox: &mut Inbox, message: Message, lost: u32) -> Result<(), Failure> {
         let pair = match (message, &mut self.audience.voice) {
             (Message::Pair(pair), _) => pair,
-            (Message::Picture(part), _) => {
+            (Message::Picture(part), _) if self.options.front != Front::Balls => {
                 self.mosaic.add(&part);
                 return Ok(());
             }

@@ -7,7 +7,7 @@ use crate::reconstruct::{Front, Options};
 use crate::source::exposure::Exposure;
 use crate::source::serial::inbox::Message;
 use crate::source::serial::session::{Session, SessionError};
-use shared::wire::{self, ExposureSetting, PictureKind, ToDevice};
+use shared::wire::{self, ErrorCode, ExposureSetting, PictureKind, ToDevice};
 use std::mem::take;
 
 /// What a device can be told of how it looks.
@@ -79,7 +79,7 @@ impl Orders {
         }
         match session.order(&ToDevice::Grab(PictureKind::Grey)) {
             // It has this order already, or its cameras are being started again: it is asked at the next pair.
-            Err(SessionError::Refused(_)) => Ok(()),
+            Err(SessionError::Refused(ErrorCode::Busy | ErrorCode::Camera)) => Ok(()),
             result => result,
         }
     }

@@ -60,7 +60,7 @@ impl Mosaic {
     /// Both pictures of this pair, when they are whole.
     #[must_use]
     pub fn pictures_of(&self, pair: u32) -> Option<[GrayImage; 2]> {
-        self.pictures().filter(|_| self.pair == Some(pair))
+        (self.pair == Some(pair)).then(|| self.pictures()).flatten()
     }
 
     /// Both pictures, when they are whole; a mask is 0 and 255.

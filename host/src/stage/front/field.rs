@@ -43,10 +43,10 @@ const REACH: [f64; 2] = [-2.5, 0.95];
 const THIN: f64 = 3.0;
 
 /// Nodes around one, on each side, whose evidence counts.
-const AROUND: usize = 4;
+const AROUND: usize = 7;
 /// What the displacement must gain in log-likelihood around a node, as a score: neighbours in blurred images are not
 /// independent. Noise alone stays below 7 for nine nodes in ten.
-const EVIDENCE: f64 = 8.0;
+const EVIDENCE: f64 = 14.0;
 /// Least standard deviation of a residual for that, grey levels: rounding, after a blur.
 const ROUNDED: f64 = 0.1;
 
