@@ -86,7 +86,7 @@ fn how_fast_it_is() {
     let server = Server::start();
     let url = server.url();
     let batch = Batch { folder: &pairs, out: &made, server: &url, name: "speed", kind: FULL, tries: "5" };
-    println!("{} pairs, best of {}: replay, batch, ratio", TIMED, ROUNDS);
+    println!("{TIMED} pairs, best of {ROUNDS}: replay, batch, ratio");
     let [mut waiting, mut done] = [0; 2];
     let begun = server.time();
     for threads in [1, 2] {

@@ -148,14 +148,12 @@ fn serve(storage: &Path, port: u16) -> Child {
     command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
     let process = command.spawn().expect("nats-server (Debian: apt-get install nats-server)");
     let end = Instant::now() + PATIENCE;
-    loop {
-        let greeted = TcpStream::connect(("127.0.0.1", port)).and_then(|mut stream| stream.read(&mut [0; 4]));
-        if greeted.is_ok_and(|bytes| bytes > 0) {
-            return process;
-        }
+    let greeted = || TcpStream::connect(("127.0.0.1", port)).and_then(|mut stream| stream.read(&mut [0; 4]));
+    while !greeted().is_ok_and(|bytes| bytes > 0) {
         assert!(Instant::now() < end, "nats-server did not start");
         sleep(Duration::from_millis(50));
     }
+    process
 }
 
 fn end(process: &mut Child) {

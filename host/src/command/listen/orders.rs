@@ -16,6 +16,8 @@ pub(super) struct Orders {
     kept: [Option<ToDevice>; ORDERS.len()],
     /// What of the page the device was told.
     settings: Settings,
+    /// Whether threshold and polarity were among it.
+    said: [bool; 2],
     /// Whether it takes pairs.
     runs: bool,
 }
@@ -26,7 +28,8 @@ impl Orders {
         let threshold = args.threshold.or_else(|| shown.then_some(settings.threshold));
         let polarity = args.polarity.or_else(|| shown.then_some(settings.polarity));
         let kept = [threshold.map(ToDevice::Threshold), polarity.map(ToDevice::Polarity), None];
-        Self { kept, settings, runs: false }
+        let said = [threshold.is_some(), polarity.is_some()];
+        Self { kept, settings, said, runs: false }
     }
 
     /// Has a device that was greeted begin.
@@ -55,7 +58,9 @@ impl Orders {
     pub(super) fn follow(&mut self, session: &mut Session, desk: &mut Desk<'_>) -> Result<(), SessionError> {
         let Some(control) = &desk.audience.control else { return Ok(()) };
         let ((settings, _), before) = (control.settings(), self.settings);
-        let wanted = control.wants_pairs();
+        let (wanted, said) = (control.wants_pairs(), control.said());
+        // What is said for the first time may be what it would be otherwise, but not what the device has.
+        let [threshold, polarity] = [0, 1].map(|k| said[k] && !self.said[k]);
         let exposure = settings.exposure.filter(|_| settings.exposure != before.exposure);
         let exposure = exposure.map(|exposure| match exposure {
             Exposure::Auto => ExposureSetting::Auto,
@@ -65,8 +70,10 @@ impl Orders {
             })),
         });
         let changed = [
-            (settings.threshold != before.threshold).then_some(ToDevice::Threshold(settings.threshold)),
-            (settings.polarity != before.polarity).then_some(ToDevice::Polarity(settings.polarity)),
+            (threshold || settings.threshold != before.threshold)
+                .then_some(ToDevice::Threshold(settings.threshold)),
+            (polarity || settings.polarity != before.polarity)
+                .then_some(ToDevice::Polarity(settings.polarity)),
             exposure.map(ToDevice::Exposure),
         ];
         for (which, order) in changed.into_iter().enumerate() {
@@ -77,7 +84,7 @@ impl Orders {
             }
         }
         // Not before: what a device did not hear, because it was lost, it is told when it is back.
-        self.settings = settings;
+        (self.settings, self.said) = (settings, said);
         self.run(wanted, session)
     }
 }
