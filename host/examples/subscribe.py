@@ -10,4 +10,7 @@ with zenoh.open(config) as session, session.declare_subscriber("ossature/*/*/*")
         told = json.loads(sample.attachment.to_string())
         print(sample.key_expr, told["number"], told["pair"], len(sample.payload), flush=True)
         if str(sample.key_expr).endswith("/model"):
-            pathlib.Path(f"{told['run']}-{told['pair']:06}.ply").write_bytes(sample.payload.to_bytes())
+            # Only a name and numbers: nothing from the network chooses a folder.
+            site, board = str(sample.key_expr).split("/")[1:3]
+            name = f"{site}-{board}-{int(told['run'], 16):014x}-{told['pair']:06d}.ply"
+            pathlib.Path(name).write_bytes(sample.payload.to_bytes())

@@ -5,10 +5,11 @@
 #![cfg(unix)]
 
 use std::fs;
+use std::io::{BufRead, BufReader};
 use std::net::TcpListener;
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
-use std::process::Command;
+use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
@@ -122,7 +123,7 @@ fn slowly(pressures: [Pressure; 2], models: u64, pause: Duration) -> (Vec<u64>, 
 
 /// The run of the only board.
 fn run_of(link: &Link) -> String {
-    link.last(&board("left"), Leaf::Health).unwrap()[0].envelope.run.clone()
+    link.last(&board("left"), Leaf::Health).unwrap()[0].as_ref().unwrap().envelope.run.clone()
 }
 
 fn in_gaps(gaps: &[(u64, u64)]) -> Vec<u64> {
@@ -143,12 +144,12 @@ fn what_a_slow_subscriber_loses_is_counted_and_named() {
         let lost = in_gaps(&gaps);
         assert!(!came.is_empty() && !lost.is_empty(), "{pressures:?}: {} came", came.len());
         eprintln!("{pressures:?}: {} of 150 came, lost: {gaps:?}", came.len());
+        if pressures[1] == Pressure::Newest {
+            assert_eq!(came.last(), Some(&149), "the newest is there");
+        }
         let mut all = [came, lost].concat();
         all.sort_unstable();
         assert_eq!(all, (0..150).collect::<Vec<_>>(), "{pressures:?}");
-        if pressures[1] == Pressure::Newest {
-            assert_eq!(all.last(), Some(&149), "the newest is there");
-        }
     }
 }
 
@@ -208,7 +209,7 @@ fn a_publisher_that_begins_anew_has_lost_nothing() {
         }
     }
     runs.dedup();
-    assert!(runs.len() == 3 && runs.is_sorted(), "{runs:?}");
+    assert_eq!(runs.len(), 3, "{runs:?}");
     assert_eq!(ledger.lost(), 0);
 }
 
@@ -229,8 +230,9 @@ fn orders_are_obeyed_or_refused_and_the_last_words_are_kept() {
             }
         }
     };
-    let told: Value =
-        serde_json::from_slice(order(&boards[0], "threshold", "120")[0].as_ref().unwrap()).unwrap();
+    let (whose, told) = order(&boards[0], "threshold", "120").remove(0).unwrap();
+    let told: Value = serde_json::from_slice(&told).unwrap();
+    assert_eq!(whose, boards[0]);
     assert_eq!(told["threshold"]["value"], "120");
     let threshold = |k: usize| controls[k].settings().0.threshold;
     assert_eq!([threshold(0), threshold(1)], [Threshold::Fixed(120), Threshold::Otsu]);
@@ -261,7 +263,8 @@ fn orders_are_obeyed_or_refused_and_the_last_words_are_kept() {
         publisher.status(k as u64, Map::new()).unwrap();
     }
     thread::sleep(Duration::from_millis(300));
-    let mut last = router.last(&all, Leaf::Status).unwrap();
+    let last: Result<Vec<Message>, String> = router.last(&all, Leaf::Status).unwrap().into_iter().collect();
+    let mut last = last.unwrap();
     last.sort_by(|a, b| a.board.cmp(&b.board));
     assert_eq!(last.iter().map(|message| message.board.clone()).collect::<Vec<_>>(), boards);
     for message in &last {
@@ -272,6 +275,131 @@ fn orders_are_obeyed_or_refused_and_the_last_words_are_kept() {
     assert_eq!(router.last(&all, Leaf::Model).unwrap(), [], "models are not kept");
     drop(publishers);
     assert_eq!(router.last(&all, Leaf::Status).unwrap(), [], "who is gone does not answer");
+}
+
+#[test]
+fn a_name_that_is_taken_is_refused_until_it_is_free() {
+    let (router, client) = meet();
+    let first = client.publish(&board("left"), Pressure::Wait, control()).unwrap();
+    let other = client.publish(&board("right"), Pressure::Wait, control()).unwrap();
+    for link in [&client, &router] {
+        let end = Instant::now() + PATIENCE;
+        // A router hears of a name a moment later.
+        let error = loop {
+            match link.publish(&board("left"), Pressure::Wait, control()) {
+                Err(error) => break error,
+                Ok(_) => assert!(Instant::now() < end, "two have one name"),
+            }
+        };
+        assert!(matches!(error, FleetError::Named(_)), "{error}");
+    }
+    drop(first);
+    let _again = client.publish(&board("left"), Pressure::Wait, control()).unwrap();
+    drop(other);
+}
+
+/// A program of ours that was told to stand still, killed at the end.
+struct Hung(Child);
+
+impl Drop for Hung {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+#[test]
+fn a_subscriber_that_hangs_is_given_up_and_the_others_go_on() {
+    let place = format!("tcp/127.0.0.1:{}", free_port());
+    let router = Link::open(&Meeting { listen: vec![place.clone()], ..Meeting::default() }).unwrap();
+    let client = Link::open(&Meeting { connect: vec![place.clone()], ..Meeting::default() }).unwrap();
+    let hung = Command::new(env!("CARGO_BIN_EXE_host"))
+        .args(["subscribe", "--connect", &place, "--json"])
+        .stdout(Stdio::piped())
+        .spawn();
+    let mut hung = Hung(hung.unwrap());
+    let mut lines = BufReader::new(hung.0.stdout.take().unwrap()).lines();
+    assert!(lines.next().unwrap().unwrap().contains("subscribed"));
+    let mut publisher = client.publish(&board("left"), Pressure::Wait, control()).unwrap();
+    while !lines.next().unwrap().unwrap().contains("told") {
+        publisher.put(Leaf::Pair, 1, b"{}".to_vec()).unwrap();
+    }
+    let stopped = Command::new("kill").args(["-STOP", &hung.0.id().to_string()]).status();
+    assert!(stopped.unwrap().success());
+    let (begun, mut longest) = (Instant::now(), Duration::ZERO);
+    for pair in 1..=60 {
+        let before = Instant::now();
+        publisher.put(Leaf::Model, pair, vec![0; MODEL]).unwrap();
+        longest = longest.max(before.elapsed());
+    }
+    eprintln!("a hung subscriber: the longest wait {longest:.1?}, all {:.1?}", begun.elapsed());
+    assert!(longest > Duration::from_secs(3), "it has held nobody up: {longest:?}");
+    assert!(longest < Duration::from_secs(25) && begun.elapsed() < Duration::from_secs(40), "{longest:?}");
+    // The link of the publisher is as it was.
+    let end = Instant::now() + PATIENCE;
+    while router.order(&board("left"), "threshold", "9").unwrap().iter().all(Result::is_err) {
+        assert!(Instant::now() < end, "it takes no orders any more");
+    }
+}
+
+#[test]
+fn a_router_that_comes_back_is_met_again_and_what_was_lost_is_named() {
+    let place = format!("tcp/127.0.0.1:{}", free_port());
+    let listen = || Link::open(&Meeting { listen: vec![place.clone()], ..Meeting::default() });
+    let router = listen().unwrap();
+    let [sending, hearing] = [(); 2]
+        .map(|()| Link::open(&Meeting { connect: vec![place.clone()], ..Meeting::default() }).unwrap());
+    let subscriber = hearing.subscribe(&"ossature/*/*".parse().unwrap(), Pressure::Wait).unwrap();
+    let mut publisher = sending.publish(&board("left"), Pressure::Wait, control()).unwrap();
+    warm(&mut publisher, &subscriber);
+    let mut ledger = Ledger::default();
+    publisher.put(Leaf::Pair, 1, b"{}".to_vec()).unwrap();
+    let Message { board, leaf, envelope, .. } = next(&subscriber);
+    assert_eq!(ledger.came(&board, leaf, &envelope.run, envelope.number), None);
+    drop(router);
+    thread::sleep(Duration::from_secs(1));
+    for pair in 2..=6 {
+        publisher.put(Leaf::Pair, pair, b"{}".to_vec()).unwrap();
+    }
+    let end = Instant::now() + PATIENCE;
+    let _router = loop {
+        match listen() {
+            Ok(router) => break router,
+            Err(error) => assert!(Instant::now() < end, "{error}"),
+        }
+        thread::sleep(Duration::from_millis(200));
+    };
+    let status = loop {
+        assert!(Instant::now() < end, "nobody meets again");
+        publisher.status(6, Map::new()).unwrap();
+        if let Some(message) = subscriber.next(Duration::from_millis(250)).unwrap() {
+            break message.unwrap();
+        }
+    };
+    let gap = ledger.sent(&status.board, Leaf::Pair, &status.envelope.run, 6).unwrap();
+    assert_eq!(gap.to_string(), "ossature/lab/left/pair: 5 messages are lost, 1 to 5");
+}
+
+#[test]
+fn who_does_not_listen_is_no_router_and_what_is_no_place_is_wrong_usage() {
+    let folder = TempDir::new().unwrap();
+    let config = folder.path().join("member.json5");
+    fs::write(&config, r#"{ connect: { endpoints: ["tcp/127.0.0.1:1"] } }"#).unwrap();
+    let host = |arguments: &[&str]| {
+        let done = Command::new(env!("CARGO_BIN_EXE_host")).args(arguments).output().unwrap();
+        (done.status.code(), String::from_utf8_lossy(&done.stderr).into_owned())
+    };
+    let config = config.to_str().unwrap();
+    for (arguments, code, words) in [
+        (&["fleet", "router", "--zenoh-config", config][..], 1, "nowhere to listen"),
+        (&["fleet", "--connect", "127.0.0.1:7447"], 2, "give tcp/HOST:PORT"),
+        (&["subscribe", "--listen-at", "tcp/127.0.0.1"], 2, "give tcp/HOST:PORT"),
+        (&["fleet", "list", "--listen-at", "tcp/127.0.0.1:0"], 2, "host fleet router"),
+        (&["listen", "--calib", "x", "--connect", "tcp/127.0.0.1:1"], 2, "need --publish"),
+    ] {
+        let (ended, told) = host(arguments);
+        assert!(ended == Some(code) && told.contains(words), "{arguments:?}: {ended:?} {told}");
+    }
 }
 
 /// What listens, and what waits for datagrams: addresses as the kernel writes them.
@@ -315,9 +443,10 @@ fn nothing_is_reachable_from_elsewhere_unless_it_is_said() {
 /// The blocks of a document that begin with this line.
 fn blocks<'a>(document: &'a str, kind: &'a str) -> impl Iterator<Item = &'a str> {
     let fence = format!("```{kind}\n");
-    document.split("```").enumerate().filter_map(move |(k, block)| {
-        (k % 2 == 1 && format!("```{block}").starts_with(&fence)).then(|| &block[kind.len() + 1..])
-    })
+    let fenced = document.split("```").skip(1).step_by(2);
+    fenced
+        .filter(move |block| format!("```{block}").starts_with(&fence))
+        .map(|block| &block[kind.len() + 1..])
 }
 
 #[test]

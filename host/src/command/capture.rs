@@ -116,8 +116,6 @@ pub struct Args {
     only_record: bool,
     #[command(flatten)]
     view: ViewArgs,
-    #[command(flatten)]
-    publish: PublishArgs,
     /// Folder for the results
     #[arg(
         long,
@@ -138,6 +136,8 @@ pub struct Args {
     /// Print one JSON document at the end instead of text
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    publish: PublishArgs,
 }
 
 impl Args {

@@ -23,13 +23,14 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use clap::builder::PossibleValuesParser;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
+use super::options::usage;
 use super::publish::MeetingArgs;
 use super::table::count;
 use super::{Failure, interruption, note, say, say_json, say_json_line};
 use crate::fleet::key::{Board, Leaf};
-use crate::fleet::{Link, MEETING_PLACE, Meeting, printable};
+use crate::fleet::{BOARDS, Link, MEETING_PLACE, Meeting, printable};
 use roster::Roster;
 
 /// From one look at the boards to the next.
@@ -42,11 +43,11 @@ const LOOK: Duration = Duration::from_millis(50);
 pub struct Args {
     #[command(subcommand)]
     action: Option<Action>,
-    #[command(flatten)]
-    meeting: MeetingArgs,
     /// Print JSON instead of text
     #[arg(long, global = true)]
     pub(super) json: bool,
+    #[command(flatten)]
+    meeting: MeetingArgs,
 }
 
 /// What to do.
@@ -93,6 +94,9 @@ const ORDERS: [&str; 5] = ["threshold", "polarity", "region", "exposure", "pairs
 /// If the fleet cannot be met, no board answers, or one refuses.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let meeting = args.meeting.meeting();
+    if args.meeting.listens() && !matches!(args.action, Some(Action::Router)) {
+        return Err(usage("--listen-at is for `host fleet router`; others meet there with --connect"));
+    }
     let (boards, watch) = match &args.action {
         None => ("ossature/*/*".parse()?, None),
         Some(Action::List { boards, watch, seconds }) => (boards.clone(), watch.then_some(*seconds)),
@@ -110,7 +114,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 
 fn list(link: &Link, boards: &Board, json: bool) -> Result<(), Failure> {
     let mut roster = Roster::default();
-    roster.answered(link.last(boards, Leaf::Status)?);
+    look(link, boards, &mut roster)?;
     if roster.is_empty() {
         return Err(format!(
             "no board answers to {boards}; start `host listen --publish ossature/SITE/BOARD`, or look under which names \
@@ -121,17 +125,32 @@ fn list(link: &Link, boards: &Board, json: bool) -> Result<(), Failure> {
     if json { say_json(&roster.as_json()) } else { say(&roster.as_text()) }
 }
 
+/// Asks all boards; what cannot be read is told.
+fn look(link: &Link, boards: &Board, roster: &mut Roster) -> Result<(), Failure> {
+    let (mut messages, answers) = (Vec::new(), link.last(boards, Leaf::Status)?);
+    for answer in answers {
+        match answer {
+            Ok(message) => messages.push(message),
+            Err(why) => note(&format!("warning: {}", printable(&why))),
+        }
+    }
+    if !roster.answered(messages) {
+        note(&format!("warning: more than {BOARDS} boards answered; name fewer with KEY"));
+    }
+    Ok(())
+}
+
 fn keep_watching(link: &Link, boards: &Board, seconds: Option<u32>, json: bool) -> Result<(), Failure> {
     let (stop, mut roster) = (interruption()?, Roster::default());
     let end = seconds.map(|seconds| Instant::now() + Duration::from_secs(seconds.into()));
     let is_over = || stop.load(Ordering::Relaxed) || end.is_some_and(|end| Instant::now() >= end);
     while !is_over() {
         let next = Instant::now() + AGAIN;
-        roster.answered(link.last(boards, Leaf::Status)?);
+        look(link, boards, &mut roster)?;
         if json {
-            say_json_line(&roster.as_json())?
+            say_json_line(&roster.as_json())?;
         } else {
-            say(&format!("{}\n", roster.as_text()))?
+            say(&format!("{}\n", roster.as_text()))?;
         }
         while Instant::now() < next && !is_over() {
             thread::sleep(LOOK);
@@ -144,7 +163,11 @@ fn order(link: &Link, boards: &Board, (what, value): (&str, &str), json: bool) -
     let (mut obeyed, mut refused) = (Vec::<Value>::new(), Vec::new());
     for answer in link.order(boards, what, value)? {
         match answer {
-            Ok(settings) => obeyed.push(serde_json::from_slice(&settings).unwrap_or_default()),
+            Ok((board, settings)) => {
+                let mut settings: Map<_, _> = serde_json::from_slice(&settings).unwrap_or_default();
+                settings.insert("board".into(), board.to_string().into());
+                obeyed.push(settings.into());
+            }
             Err(why) => refused.push(why),
         }
     }
@@ -171,6 +194,7 @@ fn router(mut meeting: Meeting) -> Result<(), Failure> {
     if meeting.listen.is_empty() && meeting.config.is_none() {
         meeting.listen.push(MEETING_PLACE.into());
     }
+    meeting.must_listen = true;
     let (_link, stop) = (Link::open(&meeting)?, interruption()?);
     note(&format!("the fleet meets at {meeting}, until Ctrl-C"));
     while !stop.load(Ordering::Relaxed) {

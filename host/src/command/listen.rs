@@ -100,8 +100,6 @@ pub struct Args {
     record: Option<PathBuf>,
     #[command(flatten)]
     view: ViewArgs,
-    #[command(flatten)]
-    publish: PublishArgs,
     /// Folder for the results
     #[arg(
         long,
@@ -119,6 +117,8 @@ pub struct Args {
     /// Print lines of JSON instead of text
     #[arg(long)]
     pub(super) json: bool,
+    #[command(flatten)]
+    publish: PublishArgs,
 }
 
 /// One device among those that are listened to.
@@ -209,7 +209,11 @@ fn one(args: &Args, seat: &Seat<'_>, link: Option<&Link>, stop: &AtomicBool) -> 
     let fleet = link.zip(seat.board);
     let control = match &view {
         Some(view) => Some(Arc::clone(view.control())),
-        None => fleet.map(|_| Arc::new(Control::new(asked, limits()))),
+        None => fleet.map(|_| {
+            // A fleet shows and sends what somebody has said, not what the device has from before.
+            let said = [args.threshold.is_some(), args.polarity.is_some()];
+            Arc::new(Control::new(asked, limits()).knowing(said))
+        }),
     };
     let voice =
         fleet.zip(control.as_ref()).map(|((link, board), control)| args.publish.voice(link, board, control));
@@ -218,7 +222,7 @@ fn one(args: &Args, seat: &Seat<'_>, link: Option<&Link>, stop: &AtomicBool) -> 
     let mut desk = Desk::new((&model, &options), (seat.out.as_deref(), wanted), audience);
     let end = args.seconds.map(|seconds| Instant::now() + Duration::from_secs(seconds.into()));
     let mut session = begin(args, seat.port, &model, &mut desk)?;
-    let mut orders = Orders::new(args, asked, &options, desk.audience.control.is_some());
+    let mut orders = Orders::new(args, asked, &options, desk.audience.view.is_some());
     let heard = listen(args, (&mut session, &mut orders), &mut desk, || {
         stop.load(Ordering::Relaxed) || end.is_some_and(|end| Instant::now() >= end)
     });

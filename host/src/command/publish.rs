@@ -8,9 +8,10 @@ use serde_json::{Map, Value, json};
 use shared::camera::PairModel;
 use shared::wire::ToDevice;
 
+use super::options::usage;
 use super::{Failure, note, words_of};
 use crate::fleet::key::{Board, Leaf};
-use crate::fleet::{Link, Meeting, Pressure, Publisher};
+use crate::fleet::{FleetError, Link, Meeting, Pressure, Publisher};
 use crate::live::control::Control;
 use crate::live::rate::Rate;
 use crate::output::surface;
@@ -38,20 +39,37 @@ pub(super) struct PublishArgs {
 #[command(next_help_heading = "Fleet")]
 pub(super) struct MeetingArgs {
     /// Meet the fleet where a router listens [default: tcp/127.0.0.1:7447]
-    #[arg(long, global = true, value_name = "tcp/HOST:PORT")]
+    #[arg(long, global = true, value_name = "tcp/HOST:PORT", value_parser = place)]
     connect: Vec<String>,
     /// Be the router at which the fleet meets
-    #[arg(long, global = true, value_name = "tcp/HOST:PORT")]
+    #[arg(long, global = true, value_name = "tcp/HOST:PORT", value_parser = place)]
     listen_at: Vec<String>,
     /// Zenoh's own configuration: certificates, access control
     #[arg(long, global = true, value_name = "FILE")]
     zenoh_config: Option<PathBuf>,
 }
 
+/// A place in Zenoh's words.
+fn place(text: &str) -> Result<String, String> {
+    let address = text.strip_prefix("tcp/").or_else(|| text.strip_prefix("tls/"));
+    match address.and_then(|address| address.rsplit_once(':')) {
+        Some((host, port)) if !host.is_empty() && port.parse::<u16>().is_ok() => Ok(text.to_owned()),
+        _ => Err("give tcp/HOST:PORT or tls/HOST:PORT, as tcp/127.0.0.1:7447".into()),
+    }
+}
+
 impl MeetingArgs {
     pub(super) fn meeting(&self) -> Meeting {
         let Self { connect, listen_at, zenoh_config } = self.clone();
-        Meeting { connect, listen: listen_at, config: zenoh_config }
+        Meeting { connect, listen: listen_at, config: zenoh_config, must_listen: false }
+    }
+
+    fn is_said(&self) -> bool {
+        self.listens() || !self.connect.is_empty() || self.zenoh_config.is_some()
+    }
+
+    pub(super) const fn listens(&self) -> bool {
+        !self.listen_at.is_empty()
     }
 }
 
@@ -67,6 +85,9 @@ impl PublishArgs {
 
     /// Meets the fleet, if that is wanted.
     pub(super) fn meet(&self) -> Result<Option<Link>, Failure> {
+        if !self.is_wanted() && (self.newest || self.meeting.is_said()) {
+            return Err(usage("--newest, --connect, --listen-at and --zenoh-config need --publish"));
+        }
         Ok(self.is_wanted().then(|| Link::open(&self.meeting.meeting())).transpose()?)
     }
 
@@ -116,7 +137,7 @@ impl Voice {
     /// A board is there.
     pub(super) fn greeted(&mut self, about: Value) {
         (self.about, self.away, self.told) = (about, None, None);
-        self.heard = Instant::now();
+        self.heard();
     }
 
     /// A board is gone.
@@ -133,10 +154,15 @@ impl Voice {
         }
     }
 
+    /// The board is there, whether or not what it sends is wanted.
+    pub(super) fn heard(&mut self) {
+        self.heard = Instant::now();
+    }
+
     /// A pair has come; all that is said until the next is about it.
     pub(super) fn begin(&mut self) {
         self.pairs += 1;
-        self.heard = Instant::now();
+        self.heard();
         self.rate.step();
     }
 
@@ -159,7 +185,7 @@ impl Voice {
 
     /// How the device fares.
     pub(super) fn health(&mut self, health: &Value) {
-        self.heard = Instant::now();
+        self.heard();
         self.put(Leaf::Health, health.to_string().into_bytes());
     }
 
@@ -190,21 +216,19 @@ impl Voice {
             status.insert(name.into(), value);
         }
         let sent = self.publisher.status(self.pairs, status);
-        self.judge(sent.map_err(Failure::from));
+        self.judge(sent.err());
     }
 
     fn put(&mut self, leaf: Leaf, bytes: Vec<u8>) {
         let put = self.publisher.put(leaf, self.pairs, bytes);
-        self.judge(put.map_err(Failure::from));
+        self.judge(put.err());
     }
 
     /// A fleet that cannot be told is no reason to end.
-    fn judge(&mut self, result: Result<(), Failure>) {
-        if let Err(failure) = &result
-            && !self.fails
-        {
-            note(&words_of(&**failure));
+    fn judge(&mut self, error: Option<FleetError>) {
+        let before = std::mem::replace(&mut self.fails, error.is_some());
+        if let Some(error) = error.filter(|_| !before) {
+            note(&words_of(&error));
         }
-        self.fails = result.is_err();
     }
 }

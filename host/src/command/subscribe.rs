@@ -20,8 +20,11 @@
 mod keep;
 mod look;
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread;
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
@@ -33,11 +36,13 @@ use super::view::ViewArgs;
 use super::{Failure, interruption, note, say, say_json_line};
 use crate::fleet::key::{Board, Leaf};
 use crate::fleet::ledger::{Gap, Ledger};
-use crate::fleet::{Link, Message, Pressure, printable};
+use crate::fleet::{ANSWER, BOARDS, Link, Message, Pressure, printable};
 use look::Looker;
 
 /// Longest that is waited for a message before time is looked at.
 const LOOK: Duration = Duration::from_millis(100);
+/// Longest that what has arrived is taken after the end.
+const REST: Duration = Duration::from_secs(2);
 
 /// Arguments of `subscribe`.
 #[derive(Debug, clap::Args)]
@@ -61,11 +66,11 @@ pub struct Args {
     /// Stop after so many seconds
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     seconds: Option<u32>,
-    #[command(flatten)]
-    meeting: MeetingArgs,
     /// Print lines of JSON instead of text
     #[arg(long)]
     pub(super) json: bool,
+    #[command(flatten)]
+    meeting: MeetingArgs,
 }
 
 /// Subscribes until enough has come.
@@ -81,6 +86,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let mut desk = Desk {
         args,
         looker: Looker::open(&args.view, &args.boards, args.grow.device_options())?,
+        boards: BTreeSet::new(),
+        is_full: false,
         ledger: Ledger::default(),
         models: 0,
     };
@@ -91,9 +98,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         note(&format!("hearing {}, until Ctrl-C", args.boards));
     }
     // What boards said before this was there.
-    for message in link.last(&args.boards, Leaf::Calibration)? {
-        desk.take(&message)?;
-    }
+    let mut question = Question::new(&link, &args.boards);
+    question.ask();
     let end = args.seconds.map(|seconds| Instant::now() + Duration::from_secs(seconds.into()));
     let stop = interruption()?;
     let is_over = |models| {
@@ -102,26 +108,98 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             || end.is_some_and(|end| Instant::now() >= end)
     };
     while !is_over(desk.models) {
-        match subscriber.next(LOOK)? {
-            Some(Ok(message)) => desk.count(&message)?,
-            Some(Err(why)) => note(&printable(&why)),
-            None => {}
+        desk.hear(subscriber.next(LOOK)?, &mut question)?;
+        while let Some(message) = question.answer() {
+            desk.take(&message)?;
         }
     }
+    // What has arrived is not thrown away, unless it would be more than was asked for.
+    let end = Instant::now() + REST;
+    while args.models.is_none_or(|most| desk.models < most) && Instant::now() < end {
+        let Some(message) = subscriber.next(Duration::from_millis(1))? else { break };
+        desk.hear(Some(message), &mut question)?;
+    }
     desk.close()
+}
+
+/// What boards are asked aside, so that messages are taken meanwhile.
+struct Question<'a> {
+    link: &'a Link,
+    boards: &'a Board,
+    /// When it was asked last.
+    asked: Option<Instant>,
+    answers: (Sender<Message>, Receiver<Message>),
+}
+
+impl<'a> Question<'a> {
+    fn new(link: &'a Link, boards: &'a Board) -> Self {
+        Self { link, boards, asked: None, answers: channel() }
+    }
+
+    /// What do the pixels of your shapes mean? Not while an answer may still come.
+    fn ask(&mut self) {
+        if self.asked.is_some_and(|asked| asked.elapsed() < 2 * ANSWER) {
+            return;
+        }
+        self.asked = Some(Instant::now());
+        let (link, boards, answers) = (self.link.clone(), self.boards.clone(), self.answers.0.clone());
+        // A link that failed is told where messages are taken, and what has no answer is asked again.
+        thread::spawn(move || {
+            let last = link.last(&boards, Leaf::Calibration).unwrap_or_default();
+            // Who asked may be gone.
+            last.into_iter().flatten().for_each(|message| drop(answers.send(message)));
+        });
+    }
+
+    /// An answer that has come.
+    fn answer(&self) -> Option<Message> {
+        self.answers.1.try_recv().ok()
+    }
 }
 
 /// Where messages become files, pictures and words.
 struct Desk<'a> {
     args: &'a Args,
     looker: Option<Looker>,
+    /// Those that something came from.
+    boards: BTreeSet<Board>,
+    /// Whether something came from more than there is room for.
+    is_full: bool,
     ledger: Ledger,
     models: u64,
 }
 
 impl Desk<'_> {
-    /// A message in its place.
-    fn count(&mut self, message: &Message) -> Result<(), Failure> {
+    /// What has come, if anything has. A shape whose pixels have no meaning yet makes a question.
+    fn hear(
+        &mut self,
+        came: Option<Result<Message, String>>,
+        question: &mut Question<'_>,
+    ) -> Result<(), Failure> {
+        let message = match came {
+            None => return Ok(()),
+            Some(Err(why)) => {
+                note(&printable(&why));
+                return Ok(());
+            }
+            Some(Ok(message)) => message,
+        };
+        if self.boards.len() >= BOARDS && !self.boards.contains(&message.board) {
+            if !self.is_full {
+                note(&format!("warning: more than {BOARDS} boards send; name fewer with KEY"));
+            }
+            self.is_full = true;
+            return Ok(());
+        }
+        self.boards.insert(message.board.clone());
+        if !self.count(&message)? {
+            question.ask();
+        }
+        Ok(())
+    }
+
+    /// A message in its place; returns as [`Self::take`].
+    fn count(&mut self, message: &Message) -> Result<bool, Failure> {
         let Message { board, leaf, envelope, bytes } = message;
         let gap = self.ledger.came(board, *leaf, &envelope.run, envelope.number);
         gap.map_or(Ok(()), |gap| self.missed(&gap))?;
@@ -139,33 +217,34 @@ impl Desk<'_> {
         self.take(message)
     }
 
-    /// Keeps and shows a message.
-    fn take(&mut self, message: &Message) -> Result<(), Failure> {
+    /// Keeps and shows a message; returns whether all is known that is needed for it.
+    fn take(&mut self, message: &Message) -> Result<bool, Failure> {
         if let Some(out) = &self.args.out {
             keep::keep(out, message)?;
         }
-        if let Some(looker) = &mut self.looker {
-            looker.see(message, self.ledger.lost())?;
+        let is_known = match &mut self.looker {
+            Some(looker) => looker.see(message, self.ledger.lost())?,
+            None => true,
+        };
+        if message.leaf == Leaf::Pair {
+            self.tell(message)?;
         }
-        let Message { board, leaf, envelope, bytes } = message;
-        match leaf {
-            Leaf::Model => self.models += 1,
-            Leaf::Pair => {
-                let told: Value = serde_json::from_slice(bytes).unwrap_or_default();
-                return if self.args.json {
-                    say_json_line(&json!({
-                        "board": board.to_string(), "run": envelope.run, "pair": envelope.pair, "told": told,
-                    }))
-                } else {
-                    let became = told["error"]
-                        .as_str()
-                        .map_or_else(|| "a model".into(), |why| format!("refused: {}", printable(why)));
-                    say(&format!("{board}: pair {}: {became}\n", envelope.pair))
-                };
-            }
-            _ => {}
+        Ok(is_known)
+    }
+
+    /// What became of a pair, which is the last that is sent about it.
+    fn tell(&mut self, message: &Message) -> Result<(), Failure> {
+        let Message { board, envelope, bytes, .. } = message;
+        let told: Value = serde_json::from_slice(bytes).unwrap_or_default();
+        let error = told["error"].as_str();
+        self.models += u64::from(error.is_none());
+        if self.args.json {
+            return say_json_line(&json!({
+                "board": board.to_string(), "run": envelope.run, "pair": envelope.pair, "told": told,
+            }));
         }
-        Ok(())
+        let became = error.map_or_else(|| "a model".into(), |why| format!("refused: {}", printable(why)));
+        say(&format!("{board}: pair {}: {became}\n", envelope.pair))
     }
 
     fn missed(&self, gap: &Gap) -> Result<(), Failure> {

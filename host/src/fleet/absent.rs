@@ -51,7 +51,7 @@ impl Link {
     ///
     /// # Errors
     /// None.
-    pub fn last(&self, _: &Board, _: Leaf) -> Result<Vec<Message>, FleetError> {
+    pub fn last(&self, _: &Board, _: Leaf) -> Result<Vec<Result<Message, String>>, FleetError> {
         match self.0 {}
     }
 

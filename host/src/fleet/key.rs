@@ -137,6 +137,15 @@ impl Leaf {
         }
     }
 
+    /// Longest that it may be, bytes.
+    #[must_use]
+    pub const fn most(self) -> usize {
+        match self {
+            Self::Model => 16 << 20,
+            _ => 64 << 10,
+        }
+    }
+
     /// Whether the last one can be asked for by those who come late.
     #[must_use]
     pub const fn is_kept(self) -> bool {

@@ -1,14 +1,17 @@
 //! What came of each key, and what did not.
 //!
 //! * **In**: the numbers of messages as they come, and those that a board says it has sent. **Out**: gaps.
-//! * What was sent before the first that came is no loss, nor is a publisher that begins a new run. A number that is
-//!   not beyond those that came is counted as a repetition.
+//! * What was sent before the first that came is no loss, nor is a publisher that begins a new run. Runs may
+//!   take turns: two programs of one name have numbers of their own. A number that is not beyond those that came is
+//!   counted as a repetition.
 
-use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, VecDeque};
 use std::fmt;
 
 use super::key::{Board, Leaf};
+
+/// Runs of a key whose numbers are known: the last that began.
+const RUNS: usize = 4;
 
 /// Messages that never came.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -44,15 +47,30 @@ impl fmt::Display for Gap {
 /// What came under a key.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Count {
-    run: String,
-    /// The number after the last that came, or is given up.
-    next: u64,
+    /// Of each run the number after the last that came, or is given up.
+    runs: VecDeque<(String, u64)>,
     /// Messages that came.
     pub came: u64,
     /// Messages that are lost.
     pub lost: u64,
     /// Messages that came again.
     pub repeated: u64,
+}
+
+impl Count {
+    /// What a run is expected to send next, if this number is the first that is known of it.
+    fn next(&mut self, run: &str, number: u64) -> &mut u64 {
+        let place = self.runs.iter().position(|(known, _)| known == run).unwrap_or_else(|| {
+            // The first run may have begun before this end was there; one after it begins at 0.
+            let first = if self.runs.is_empty() { number } else { 0 };
+            if self.runs.len() == RUNS {
+                self.runs.pop_front();
+            }
+            self.runs.push_back((run.to_owned(), first));
+            self.runs.len() - 1
+        });
+        &mut self.runs[place].1
+    }
 }
 
 /// The counts of all keys.
@@ -64,11 +82,12 @@ impl Ledger {
     pub fn came(&mut self, board: &Board, leaf: Leaf, run: &str, number: u64) -> Option<Gap> {
         let gap = self.reach(board, leaf, run, number);
         let count = self.0.entry((board.clone(), leaf)).or_default();
-        if number < count.next {
+        let next = count.next(run, number);
+        if number < *next {
             count.repeated += 1;
         } else {
+            *next = number.saturating_add(1);
             count.came += 1;
-            count.next = number.saturating_add(1);
         }
         gap
     }
@@ -80,22 +99,13 @@ impl Ledger {
 
     /// Whatever is before this number of a run came or is lost.
     fn reach(&mut self, board: &Board, leaf: Leaf, run: &str, number: u64) -> Option<Gap> {
-        let count = match self.0.entry((board.clone(), leaf)) {
-            Entry::Vacant(place) => {
-                place.insert(Count { run: run.to_owned(), next: number, ..Count::default() });
-                return None;
-            }
-            Entry::Occupied(place) => place.into_mut(),
-        };
-        if count.run != run {
-            // A new run begins at 0, and this end was there before it.
-            (count.run, count.next) = (run.to_owned(), 0);
-        }
-        let first = count.next;
+        let count = self.0.entry((board.clone(), leaf)).or_default();
+        let next = count.next(run, number);
+        let first = *next;
         if number <= first {
             return None;
         }
-        count.next = number;
+        *next = number;
         let gap = Gap { board: board.clone(), leaf, first, last: number - 1 };
         count.lost = count.lost.saturating_add(gap.count());
         Some(gap)
@@ -144,6 +154,18 @@ mod tests {
         assert_eq!(ledger.lost(), 8);
         assert!(ledger.came(&left, Leaf::Model, "c", u64::MAX).is_some());
         assert_eq!(ledger.came(&left, Leaf::Model, "c", u64::MAX), None);
+    }
+
+    #[test]
+    fn two_of_one_name_are_no_loss_of_each_other() {
+        let (mut ledger, left) = (Ledger::default(), board("left"));
+        for number in 0..100 {
+            for run in ["a", "b"] {
+                assert_eq!(ledger.came(&left, Leaf::Model, run, number), None);
+            }
+        }
+        assert_eq!(ledger.came(&left, Leaf::Model, "a", 101).unwrap().count(), 1);
+        assert_eq!(ledger.lost(), 1);
     }
 
     #[test]

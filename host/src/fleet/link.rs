@@ -12,6 +12,7 @@ use std::time::{Duration, Instant};
 use serde_json::{Map, Value, json};
 use zenoh::bytes::Encoding;
 use zenoh::handlers::{FifoChannel, FifoChannelHandler, RingChannel, RingChannelHandler};
+use zenoh::liveliness::LivelinessToken;
 use zenoh::qos::CongestionControl;
 use zenoh::query::{ConsolidationMode, Query, QueryTarget, Queryable};
 use zenoh::sample::Sample;
@@ -19,7 +20,7 @@ use zenoh::{Config, Session, Wait};
 
 use super::envelope::{CONTRACT, Envelope, new_run, now_us};
 use super::key::{Board, Leaf};
-use super::{ANSWER, FleetError, MEETING_PLACE, Meeting, Message, Obeyed, Pressure};
+use super::{ANSWER, BOARDS, FleetError, MEETING_PLACE, Meeting, Message, Obeyed, Pressure};
 use crate::live::control::Control;
 
 /// Messages that may wait here for whoever takes them: then those who send wait.
@@ -31,16 +32,21 @@ const LISTEN: &str = "listen/endpoints";
 const CONNECT: &str = "connect/endpoints";
 const MODE: &str = "mode";
 
-/// What is otherwise in this program than in Zenoh, unless a configuration says so: who waits, waits for an hour and
-/// not for five seconds before it ends the link, and no message is longer than 64 MiB.
-const OURS: [(&str, &str); 3] = [
-    ("scouting/multicast/enabled", "false"),
-    ("transport/link/tx/queue/congestion_control/block/wait_before_close", "3600000000"),
-    ("transport/link/rx/max_message_size", "67108864"),
-];
+/// What is otherwise in this program than in Zenoh, unless a configuration says so: nobody scouts, and no message is
+/// longer than a model and what goes with it.
+const OURS: [(&str, &str); 2] =
+    [("scouting/multicast/enabled", "false"), ("transport/link/rx/max_message_size", "16842752")];
+/// How long a message waits for room at the next program, us, before the link to it is ended: at a router, and
+/// elsewhere. A router gives up who hangs before those who wait for it give up the router.
+const WAIT: &str = "transport/link/tx/queue/congestion_control/block/wait_before_close";
+const WAITS: [&str; 2] = ["10000000", "30000000"];
+/// What Zenoh has in place of an answer that did not come.
+const TIMEOUT: &str = "Timeout";
 
-fn failed(error: zenoh::Error) -> FleetError {
-    FleetError::Link(words(&error))
+impl From<zenoh::Error> for FleetError {
+    fn from(error: zenoh::Error) -> Self {
+        Self::Link(words(&error))
+    }
 }
 
 /// What Zenoh says, without where in its source it says so.
@@ -72,13 +78,19 @@ impl Link {
     /// Publish as a board, which obeys what others set of `control`.
     ///
     /// # Errors
-    /// [`FleetError::Link`].
+    /// [`FleetError::Named`] if somebody does under this name, [`FleetError::Link`].
     pub fn publish(
         &self,
         board: &Board,
         pressure: Pressure,
         control: Arc<Control>,
     ) -> Result<Publisher, FleetError> {
+        let (name, living) = (board.to_string(), self.0.liveliness());
+        let others = living.get(&name).timeout(ANSWER).with(FifoChannel::new(ROOM)).wait()?;
+        if others.iter().any(|reply| reply.result().is_ok()) {
+            return Err(FleetError::Named(board.clone()));
+        }
+        let alive = living.declare_token(&name).wait()?;
         let kept = Arc::<Mutex<Kept>>::default();
         let (its, theirs) = (board.clone(), Arc::clone(&kept));
         let asked = self
@@ -88,13 +100,14 @@ impl Link {
         let its = board.clone();
         let orders =
             self.0.declare_queryable(its.order("*")).callback(move |query| obey(&query, &its, &control));
-        let answering = [asked.wait().map_err(failed)?, orders.wait().map_err(failed)?];
+        let answering = [asked.wait()?, orders.wait()?];
         let congestion = match pressure {
             Pressure::Wait => CongestionControl::Block,
             Pressure::Newest => CongestionControl::Drop,
         };
         let (session, board, run) = (self.0.clone(), board.clone(), new_run());
-        Ok(Publisher { session, board, run, congestion, sent: BTreeMap::new(), kept, _answering: answering })
+        let (sent, rest) = (BTreeMap::new(), (answering, alive));
+        Ok(Publisher { session, board, run, congestion, sent, kept, _rest: rest })
     }
 
     /// Hear what boards publish from now on.
@@ -104,20 +117,18 @@ impl Link {
     pub fn subscribe(&self, boards: &Board, pressure: Pressure) -> Result<Subscriber, FleetError> {
         let declared = self.0.declare_subscriber(format!("{boards}/*"));
         Ok(Subscriber(match pressure {
-            Pressure::Wait => Queue::All(declared.with(FifoChannel::new(ROOM)).wait().map_err(failed)?),
-            Pressure::Newest => {
-                Queue::Newest(declared.with(RingChannel::new(NEWEST)).wait().map_err(failed)?)
-            }
+            Pressure::Wait => Queue::All(declared.with(FifoChannel::new(ROOM)).wait()?),
+            Pressure::Newest => Queue::Newest(declared.with(RingChannel::new(NEWEST)).wait()?),
         }))
     }
 
-    /// The last message that each of these boards has kept.
+    /// The last message that each of these boards has kept, or why there is none that can be read.
     ///
     /// # Errors
     /// [`FleetError::Link`].
-    pub fn last(&self, boards: &Board, leaf: Leaf) -> Result<Vec<Message>, FleetError> {
-        let answers = self.ask(&boards.key(leaf), None)?;
-        Ok(answers.into_iter().flatten().filter_map(|sample| message(&sample)?.ok()).collect())
+    pub fn last(&self, boards: &Board, leaf: Leaf) -> Result<Vec<Result<Message, String>>, FleetError> {
+        let answers = self.ask(&boards.key(leaf), None)?.into_iter();
+        Ok(answers.filter_map(|answer| answer.map_or_else(|why| Some(Err(why)), |it| message(&it))).collect())
     }
 
     /// Order something of boards: an answer from each that took it or refused it.
@@ -126,10 +137,12 @@ impl Link {
     /// [`FleetError::Link`].
     pub fn order(&self, boards: &Board, what: &str, value: &str) -> Result<Vec<Obeyed>, FleetError> {
         let answers = self.ask(&boards.order(what), Some(value))?;
-        Ok(answers
-            .into_iter()
-            .map(|answer| answer.map(|sample| sample.payload().to_bytes().into_owned()))
-            .collect())
+        let whose = |sample: &Sample| Board::one(sample.key_expr().as_str().split("/do/").next()?).ok();
+        let obeyed = |answer: Result<Sample, String>| match answer {
+            Ok(sample) => whose(&sample).map(|board| Ok((board, sample.payload().to_bytes().into_owned()))),
+            Err(why) => Some(Err(why)),
+        };
+        Ok(answers.into_iter().filter_map(obeyed).collect())
     }
 
     fn ask(&self, key: &str, payload: Option<&str>) -> Result<Vec<Result<Sample, String>>, FleetError> {
@@ -139,11 +152,15 @@ impl Link {
             Some(payload) => question.payload(payload),
             None => question,
         };
-        let answers = question.with(FifoChannel::new(ROOM)).wait().map_err(failed)?;
-        let sentence = |error: zenoh::query::ReplyError| {
-            String::from_utf8_lossy(&error.payload().to_bytes()).into_owned()
+        let answers = question.with(FifoChannel::new(ROOM)).wait()?;
+        let sentence = |error: zenoh::query::ReplyError| match &*error.payload().to_bytes() {
+            bytes if bytes == TIMEOUT.as_bytes() => format!(
+                "somebody of {key} did not answer within {} s: a subscriber that is slow may hold it up",
+                ANSWER.as_secs()
+            ),
+            bytes => String::from_utf8_lossy(bytes).into_owned(),
         };
-        Ok(answers.iter().map(|reply| reply.into_result().map_err(sentence)).collect())
+        Ok(answers.iter().take(BOARDS).map(|reply| reply.into_result().map_err(sentence)).collect())
     }
 }
 
@@ -163,6 +180,9 @@ fn configuration(meeting: &Meeting) -> Result<(Config, bool), FleetError> {
     );
     let is_said = |config: &Config, key| config.get_json(key).ok() != defaults.get_json(key).ok();
     let listens = !meeting.listen.is_empty() || is_said(&config, LISTEN);
+    if meeting.must_listen && !listens {
+        return Err(wrong("it says nowhere to listen; add listen.endpoints, or give --listen-at".into()));
+    }
     let connects = !meeting.connect.is_empty() || is_said(&config, CONNECT);
     let mut say = |key, value: Value| config.insert_json5(key, &value.to_string()).map_err(wrong);
     if !meeting.listen.is_empty() || !listens {
@@ -176,7 +196,7 @@ fn configuration(meeting: &Meeting) -> Result<(Config, bool), FleetError> {
     if !is_said(&config, MODE) {
         config.insert_json5(MODE, if listens { "\"router\"" } else { "\"client\"" }).map_err(wrong)?;
     }
-    for (key, value) in OURS {
+    for (key, value) in OURS.into_iter().chain([(WAIT, WAITS[usize::from(!listens)])]) {
         if !is_said(&config, key) {
             config.insert_json5(key, value).map_err(wrong)?;
         }
@@ -232,25 +252,29 @@ pub struct Publisher {
     /// Messages sent under each key.
     sent: BTreeMap<Leaf, u64>,
     kept: Arc<Mutex<Kept>>,
-    _answering: [Queryable<()>; 2],
+    /// What answers, and what tells others that the name is taken.
+    _rest: ([Queryable<()>; 2], LivelinessToken),
 }
 
 impl Publisher {
     /// Send what is about a pair, or about none: 0. Messages that nobody can have are numbered all the same.
     ///
     /// # Errors
-    /// [`FleetError::Link`] when this end is closed.
+    /// [`FleetError::Link`] when this end is closed, or there are more bytes than [`Leaf::most`].
     pub fn put(&mut self, leaf: Leaf, pair: u64, bytes: Vec<u8>) -> Result<(), FleetError> {
         let next = self.sent.entry(leaf).or_default();
         let (run, number) = (self.run.clone(), *next);
         *next += 1;
+        if bytes.len() > leaf.most() {
+            return Err(FleetError::Link(too_long(leaf, bytes.len())));
+        }
         let envelope = Envelope { contract: CONTRACT, run, number, pair, time_us: now_us(), age_ms: None };
         let attachment = envelope.to_bytes();
         if leaf.is_kept() {
             locked(&self.kept).insert(leaf, (envelope, Instant::now(), bytes.clone()));
         }
         let put = self.session.put(self.board.key(leaf), bytes).encoding(leaf.media()).attachment(attachment);
-        put.congestion_control(self.congestion).wait().map_err(failed)
+        Ok(put.congestion_control(self.congestion).wait()?)
     }
 
     /// Send how pairs fare, and how many messages were sent before under each key, so that nothing is missed unseen.
@@ -285,14 +309,21 @@ impl Subscriber {
             Queue::All(samples) => samples.recv_timeout(within),
             Queue::Newest(samples) => samples.recv_timeout(within),
         };
-        Ok(came.map_err(failed)?.as_ref().and_then(message))
+        Ok(came?.as_ref().and_then(message))
     }
+}
+
+fn too_long(leaf: Leaf, length: usize) -> String {
+    format!("a {} of {length} bytes is longer than {}", leaf.name(), leaf.most())
 }
 
 /// What a sample says, or why it cannot be read; None if it is none of ours.
 fn message(sample: &Sample) -> Option<Result<Message, String>> {
     let key = sample.key_expr().as_str();
     let (board, leaf) = Board::of_message(key)?;
+    if sample.payload().len() > leaf.most() {
+        return Some(Err(format!("a message under {key}: {}", too_long(leaf, sample.payload().len()))));
+    }
     let attachment = sample.attachment().map(|attachment| attachment.to_bytes()).unwrap_or_default();
     Some(match Envelope::from_bytes(&attachment) {
         Ok(envelope) => {

@@ -36,6 +36,8 @@ pub struct Meeting {
     pub listen: Vec<String>,
     /// Zenoh's own configuration, as JSON5: certificates, access control.
     pub config: Option<PathBuf>,
+    /// Whether it is of no use unless it listens.
+    pub must_listen: bool,
 }
 
 impl fmt::Display for Meeting {
@@ -78,8 +80,11 @@ pub fn printable(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { '?' } else { c }).collect()
 }
 
-/// What was answered to an order: what is set now, as JSON, or why not, in a sentence.
-pub type Obeyed = Result<Vec<u8>, String>;
+/// What was answered to an order: by whom, and what is set there now, as JSON; or why not, in a sentence.
+pub type Obeyed = Result<(Board, Vec<u8>), String>;
+
+/// Boards that one program looks at; what others send is passed over.
+pub const BOARDS: usize = 1024;
 
 /// Longest that an answer is waited for.
 pub const ANSWER: Duration = Duration::from_secs(3);
@@ -101,6 +106,12 @@ pub enum FleetError {
         /// What Zenoh says.
         why: String,
     },
+    /// Another program publishes under the same name.
+    #[error(
+        "{0} is published by another program: stop that one, or choose another name; one that was cut off is forgotten \
+         after 10 s"
+    )]
+    Named(Board),
     /// Nobody can be met.
     #[error(
         "nobody is met at {places}: {why}; start `host fleet router` there, name another place with --connect, or look \

@@ -54,6 +54,8 @@ pub struct Control {
 #[derive(Clone, Copy, Debug)]
 struct State {
     settings: Settings,
+    /// Whether threshold and polarity are known: set by somebody here, and not by whoever was there before.
+    said: [bool; 2],
     /// How often they were set.
     version: u64,
     /// Of a view, px, once one was seen.
@@ -80,8 +82,21 @@ impl Control {
     /// The settings at first, and what can be set.
     #[must_use]
     pub fn new(settings: Settings, limits: Limits) -> Self {
-        let state = Mutex::new(State { settings, version: 0, size: None, pairs: None });
+        let state = Mutex::new(State { settings, said: [true; 2], version: 0, size: None, pairs: None });
         Self { limits, state, changed: Condvar::new() }
+    }
+
+    /// Threshold and polarity are those of the settings only if so; otherwise they are not known until they are set.
+    #[must_use]
+    pub fn knowing(self, said: [bool; 2]) -> Self {
+        self.lock().said = said;
+        self
+    }
+
+    /// Whether threshold and polarity are known.
+    #[must_use]
+    pub fn said(&self) -> [bool; 2] {
+        self.lock().said
     }
 
     /// What it holds is whole at every moment, so a panic elsewhere does not matter.
@@ -133,14 +148,14 @@ impl Control {
         let wish: Wish =
             serde_json::from_slice(json).map_err(|error| format!("no wish that is known: {error}"))?;
         let mut state = self.lock();
-        let mut settings = state.settings;
+        let (mut settings, mut said) = (state.settings, state.said);
         if let Some(text) = wish.threshold {
             self.limits.threshold?;
-            settings.threshold = parse_threshold(&text)?;
+            (settings.threshold, said[0]) = (parse_threshold(&text)?, true);
         }
         if let Some(text) = wish.polarity {
             self.limits.polarity?;
-            settings.polarity = parse_polarity(&text)?;
+            (settings.polarity, said[1]) = (parse_polarity(&text)?, true);
         }
         if let Some(text) = wish.region {
             self.limits.region?;
@@ -153,6 +168,7 @@ impl Control {
             self.limits.pairs?;
             state.pairs = pairs(&text)?;
         }
+        state.said = said;
         if settings != state.settings {
             state.settings = settings;
             state.version += 1;
@@ -163,14 +179,14 @@ impl Control {
 
     /// All of it, for those who set it.
     pub(crate) fn told(&self) -> Value {
-        let State { settings, version, pairs, .. } = *self.lock();
+        let State { settings, said, version, pairs, .. } = *self.lock();
         let Limits { threshold, polarity, region, exposure, pairs: takes } = &self.limits;
         let range = exposure.as_ref().ok();
         json!({
             "version": version,
             "flags": settings.flags(),
-            "threshold": { "value": threshold_word(settings.threshold), "why": threshold.err() },
-            "polarity": { "value": polarity_name(settings.polarity), "why": polarity.err() },
+            "threshold": { "value": said[0].then(|| threshold_word(settings.threshold)), "why": threshold.err() },
+            "polarity": { "value": said[1].then(|| polarity_name(settings.polarity)), "why": polarity.err() },
             "region": { "value": settings.region.map(|region| region.to_string()), "why": region.err() },
             "exposure": {
                 "value": settings.exposure.map(|exposure| match exposure {
@@ -320,6 +336,15 @@ mod tests {
         assert_eq!(taken(), 4);
         // It is nothing that a pair is made with.
         assert_eq!(control.settings().1, 0);
+    }
+
+    #[test]
+    fn what_nobody_said_is_not_known_until_it_is_set() {
+        let control = control().knowing([false, true]);
+        assert_eq!((control.said(), &control.told()["threshold"]["value"]), ([false, true], &Value::Null));
+        assert!(control.wish(br#"{"threshold": "300"}"#).is_err() && !control.said()[0]);
+        control.wish(br#"{"threshold": "otsu"}"#).unwrap();
+        assert_eq!((control.said(), &control.told()["threshold"]["value"]), ([true; 2], &"otsu".into()));
     }
 
     #[test]

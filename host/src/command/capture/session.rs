@@ -119,7 +119,7 @@ impl<'a> Session<'a> {
             pairs: Ok(()),
         };
         let link = args.publish.meet()?;
-        let view = args.view.open(&args.title(), settings, &limits)?;
+        let view = args.view.open(&args.title(), settings, limits)?;
         let control = match &view {
             Some(view) => Some(Arc::clone(view.control())),
             None => link.as_ref().map(|_| Arc::new(Control::new(settings, limits()))),
@@ -189,6 +189,9 @@ impl<'a> Session<'a> {
 
     /// One pair.
     fn take(&mut self, live: Live, tally: &Tally) -> ControlFlow<()> {
+        if let Some(voice) = &mut self.voice {
+            voice.heard();
+        }
         if self.skip > 0 {
             self.skip -= 1;
         } else if self.control.as_ref().is_some_and(|control| !control.take_pair()) {
@@ -270,7 +273,7 @@ impl<'a> Session<'a> {
         let Some(voice) = &mut self.voice else { return };
         match result {
             Ok(Success { warnings, .. }) => {
-                voice.pair(&json!({ "pair": name, "warnings": warnings }), warnings)
+                voice.pair(&json!({ "pair": name, "warnings": warnings }), warnings);
             }
             Err(why) => voice.pair(&json!({ "pair": name, "error": why }), std::slice::from_ref(why)),
         }

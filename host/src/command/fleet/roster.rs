@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use crate::command::table::Table;
 use crate::fleet::key::Board;
-use crate::fleet::{Message, printable};
+use crate::fleet::{BOARDS, Message, printable};
 
 /// Silence after which a board that publishes is told to be silent.
 const SILENT: f64 = 30.0;
@@ -32,15 +32,21 @@ impl Roster {
         self.0.is_empty()
     }
 
-    /// All boards were asked, and these answered.
-    pub(super) fn answered(&mut self, messages: Vec<Message>) {
+    /// All boards were asked, and these answered; returns whether there was room for all of them.
+    pub(super) fn answered(&mut self, messages: Vec<Message>) -> bool {
+        let mut fits = true;
         self.0.values_mut().for_each(|entry| entry.answers = false);
         for Message { board, envelope, bytes, .. } in messages {
+            if self.0.len() >= BOARDS && !self.0.contains_key(&board) {
+                fits = false;
+                continue;
+            }
             let status: Value = serde_json::from_slice(&bytes).unwrap_or_default();
             let heard = status["heard_ms"].as_u64().unwrap_or(0).saturating_add(envelope.age_ms.unwrap_or(0));
             let (came, heard) = (Instant::now(), Duration::from_millis(heard));
             self.0.insert(board, Entry { run: envelope.run, status, came, heard, answers: true });
         }
+        fits
     }
 
     pub(super) fn as_json(&self) -> Value {
@@ -78,7 +84,7 @@ impl Entry {
         let about = &status["about"];
         match (self.firmware(), about["board"].as_str(), about["camera"].as_str()) {
             (Some(firmware), Some(name), _) => {
-                table.row("firmware", &printable(&format!("{firmware} of {name}")))
+                table.row("firmware", &printable(&format!("{firmware} of {name}")));
             }
             (_, _, Some(camera)) => table.row("camera", &printable(camera)),
             _ => table.row("firmware", "not known"),
@@ -87,12 +93,14 @@ impl Entry {
         table.row("rate", &format!("{rate:.2} pairs a second"));
         let seen = self.last_seen();
         table.row("last seen", &format!("{seen:.1} s ago"));
-        table.row("pairs", &format!("{}, {} with a model", status["pairs"], status["models"]));
+        let is_paused = status["settings"]["pairs"]["value"] == "0";
+        let paused = if is_paused { "; paused: `host fleet order` it pairs all" } else { "" };
+        table.row("pairs", &format!("{}, {} with a model{paused}", status["pairs"], status["models"]));
         if !self.answers {
             table.warning("it does not answer any more: look whether its program runs");
         } else if let Some(why) = status["away"].as_str() {
             table.warning(&printable(&format!("the device is gone: {why}")));
-        } else if seen > SILENT {
+        } else if seen > SILENT && !is_paused {
             table.warning("nothing is heard of it; look at its camera and cable");
         }
         for warning in status["warnings"].as_array().into_iter().flatten().filter_map(Value::as_str) {
@@ -125,7 +133,7 @@ mod tests {
         };
         let bytes = status.to_string().into_bytes();
         let mut roster = Roster::default();
-        roster.answered(vec![Message { board, leaf: Leaf::Status, envelope, bytes }]);
+        assert!(roster.answered(vec![Message { board, leaf: Leaf::Status, envelope, bytes }]));
         let text = roster.as_text();
         for words in
             ["1.2.3 of bench", "2.50 pairs a second", "2.0 s ago", "7, 6 with a model", "it is ?[31mdark"]
@@ -133,7 +141,7 @@ mod tests {
             assert!(text.contains(words), "{words}: {text}");
         }
         assert!(!text.contains("any more"), "{text}");
-        roster.answered(Vec::new());
+        assert!(roster.answered(Vec::new()));
         assert!(roster.as_text().contains("does not answer any more"));
         assert_eq!(roster.as_json()["boards"][0]["answers"], false);
     }

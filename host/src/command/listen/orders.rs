@@ -19,6 +19,8 @@ pub(super) struct Orders {
     kept: [Option<ToDevice>; ORDERS.len()],
     /// What of the page the device was told.
     settings: Settings,
+    /// Whether threshold and polarity were among it.
+    said: [bool; 2],
     /// Whether it takes pairs.
     runs: bool,
     /// Whether the pictures of each pair are wanted, and of the next one are to be asked for.
@@ -34,8 +36,9 @@ impl Orders {
         let threshold = args.threshold.or_else(|| shown.then_some(settings.threshold));
         let polarity = args.polarity.or_else(|| shown.then_some(settings.polarity));
         let kept = [threshold.map(ToDevice::Threshold), polarity.map(ToDevice::Polarity), None];
+        let said = [threshold.is_some(), polarity.is_some()];
         let pictures = options.front != Front::Balls;
-        Self { kept, settings, runs: false, pictures, due: pictures, pair: None }
+        Self { kept, settings, said, runs: false, pictures, due: pictures, pair: None }
     }
 
     /// Has a device that was greeted begin.
@@ -89,7 +92,9 @@ impl Orders {
         self.ask_for_pictures(session)?;
         let Some(control) = &desk.audience.control else { return Ok(()) };
         let ((settings, _), before) = (control.settings(), self.settings);
-        let wanted = control.wants_pairs();
+        let (wanted, said) = (control.wants_pairs(), control.said());
+        // What is said for the first time may be what it would be otherwise, but not what the device has.
+        let [threshold, polarity] = [0, 1].map(|k| said[k] && !self.said[k]);
         let exposure = settings.exposure.filter(|_| settings.exposure != before.exposure);
         let exposure = exposure.map(|exposure| match exposure {
             Exposure::Auto => ExposureSetting::Auto,
@@ -99,8 +104,10 @@ impl Orders {
             })),
         });
         let changed = [
-            (settings.threshold != before.threshold).then_some(ToDevice::Threshold(settings.threshold)),
-            (settings.polarity != before.polarity).then_some(ToDevice::Polarity(settings.polarity)),
+            (threshold || settings.threshold != before.threshold)
+                .then_some(ToDevice::Threshold(settings.threshold)),
+            (polarity || settings.polarity != before.polarity)
+                .then_some(ToDevice::Polarity(settings.polarity)),
             exposure.map(ToDevice::Exposure),
         ];
         for (which, order) in changed.into_iter().enumerate() {
@@ -111,7 +118,7 @@ impl Orders {
             }
         }
         // Not before: what a device did not hear, because it was lost, it is told when it is back.
-        self.settings = settings;
+        (self.settings, self.said) = (settings, said);
         self.run(wanted, session)
     }
 }

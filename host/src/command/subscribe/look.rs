@@ -24,8 +24,8 @@ pub(super) struct Looker {
     options: Options,
     inbox: Inbox,
     workspace: Workspace,
-    /// What the pixels of each board's shapes mean.
-    calibrations: BTreeMap<Board, PairModel>,
+    /// What the pixels of each board's shapes mean, in which run.
+    calibrations: BTreeMap<Board, (String, PairModel)>,
 }
 
 impl Looker {
@@ -39,36 +39,35 @@ impl Looker {
         Ok(Some(Self { view, options, inbox, workspace, calibrations: BTreeMap::new() }))
     }
 
-    /// Shows a message, if it is a shape and its pixels have a meaning; so many were lost before.
-    pub(super) fn see(&mut self, message: &Message, lost: u64) -> Result<(), Failure> {
-        let arrived = Instant::now();
+    /// Shows a message, if it is a shape; so many were lost before. Returns whether the meaning of its pixels is known.
+    pub(super) fn see(&mut self, message: &Message, lost: u64) -> Result<bool, Failure> {
+        let (arrived, Message { board, leaf, envelope, .. }) = (Instant::now(), message);
+        if !matches!(leaf, Leaf::Calibration | Leaf::Shape) {
+            return Ok(true);
+        }
         let mut buffer = vec![0; MAX_FRAME];
         let (mut decoder, mut frame) = (Decoder::new(&mut buffer), None);
         frames(&mut decoder, &message.bytes, |arrived| frame = Some(arrived));
-        let Some(frame) = frame else { return Ok(()) };
-        let Message { board, leaf, envelope, .. } = message;
-        match leaf {
-            Leaf::Calibration => {
-                if let Ok(ToDevice::Calibration(model)) = ToDevice::decode(&frame.frame()) {
-                    self.calibrations.insert(board.clone(), model);
-                }
-                return Ok(());
+        let Some(frame) = frame else { return Ok(true) };
+        if *leaf == Leaf::Calibration {
+            if let Ok(ToDevice::Calibration(model)) = ToDevice::decode(&frame.frame()) {
+                self.calibrations.insert(board.clone(), (envelope.run.clone(), model));
             }
-            Leaf::Shape => {}
-            _ => return Ok(()),
+            return Ok(true);
         }
-        let Some(model) = self.calibrations.get(board) else { return Ok(()) };
-        let Ok(inbox::Message::Pair(pair)) = self.inbox.read(&frame.frame()) else { return Ok(()) };
+        let known = self.calibrations.get(board).filter(|(run, _)| *run == envelope.run);
+        let Some((_, model)) = known else { return Ok(false) };
+        let Ok(inbox::Message::Pair(pair)) = self.inbox.read(&frame.frame()) else { return Ok(true) };
         let (mut record, place) =
             (Record::figures_only(), Place { folder: None, report: false, page: false });
-        let how = (model, &self.options);
-        let made = model::receive((&mut self.inbox, *pair), how, place, &mut record, &mut self.workspace);
+        let (sent, how) = ((&mut self.inbox, *pair, None), (model, &self.options));
+        let made = model::receive(sent, how, place, &mut record, &mut self.workspace);
         let name = format!("{}/{} {:06}", board.site(), board.name(), envelope.pair);
         let beside = Beside { name, pictures: None, remarks: Vec::new(), dropped: lost, arrived };
         let choices = (model.into(), self.options);
         match view::show((made, record), choices, beside, &mut self.view, &mut self.workspace) {
             Err(failure) if !failure.is::<NoModel>() => Err(failure),
-            _ => Ok(()),
+            _ => Ok(true),
         }
     }
 }
