@@ -11,7 +11,7 @@ use image::GrayImage;
 use oracle::link;
 use oracle::program::{host, model, within};
 use oracle::scene::{Pair, bent_camera, camera, pair};
-use oracle::socket::{carry, device, intact, prepare, serve};
+use oracle::socket::{Fault, carry, device, intact, prepare, serve};
 use shared::wire::{Counters, Decoder, MAX_FRAME};
 use std::fs;
 use std::io::{ErrorKind, Read, Write};
