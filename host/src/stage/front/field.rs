@@ -45,7 +45,7 @@ const THIN: f64 = 3.0;
 /// Nodes around one, on each side, whose evidence counts.
 const AROUND: usize = 7;
 /// What the displacement must gain in log-likelihood around a node, as a score: neighbours in blurred images are not
-/// independent. Noise alone stays below 7 for nine nodes in ten.
+/// independent, and noise alone gains too.
 const EVIDENCE: f64 = 14.0;
 /// Least standard deviation of a residual for that, grey levels: rounding, after a blur.
 const ROUNDED: f64 = 0.1;
