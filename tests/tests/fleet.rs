@@ -150,6 +150,7 @@ fn grown(shape: &Path, calibration: &Path) -> Vec<u8> {
     let outcome = pair.result.unwrap();
     let made = Workspace::default().reconstruct_shape(
         (&mut inbox.memory(), outcome),
+        None,
         &model,
         &Options::device(),
         &mut (),
