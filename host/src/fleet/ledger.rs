@@ -149,7 +149,7 @@ mod tests {
         assert_eq!((gap.first, gap.last), (3, 4));
         assert_eq!(ledger.sent(&left, Leaf::Model, "c", 5), None);
         assert_eq!(ledger.sent(&left, Leaf::Shape, "c", 5), None);
-        let (_, _, count) = ledger.counts().next().unwrap();
+        let (_, _, count) = ledger.counts().find(|(_, leaf, _)| *leaf == Leaf::Model).unwrap();
         assert_eq!((count.came, count.lost, count.repeated), (6, 8, 1));
         assert_eq!(ledger.lost(), 8);
         assert!(ledger.came(&left, Leaf::Model, "c", u64::MAX).is_some());
