@@ -4,11 +4,12 @@
 //! Needs a build with fleets, and `openssl`: `./ci.sh fleet`.
 #![cfg(unix)]
 
+mod certificates;
+
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::net::TcpListener;
 use std::os::unix::fs::MetadataExt;
-use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::thread;
@@ -443,32 +444,18 @@ fn nothing_is_reachable_from_elsewhere_unless_it_is_said() {
     assert!(matches!(error, FleetError::Taken { .. }), "{error}");
 }
 
-/// The blocks of a document that begin with this line.
-fn blocks<'a>(document: &'a str, kind: &'a str) -> impl Iterator<Item = &'a str> {
-    let fence = format!("```{kind}\n");
-    let fenced = document.split("```").skip(1).step_by(2);
-    fenced
-        .filter(move |block| format!("```{block}").starts_with(&fence))
-        .map(|block| &block[kind.len() + 1..])
-}
-
 #[test]
 fn who_has_no_certificate_is_not_let_in() {
-    if Command::new("openssl").arg("version").output().is_err() {
-        assert_ne!(std::env::var("CI").as_deref(), Ok("true"), "in CI there must be openssl");
-        eprintln!("SKIPPED: there is no openssl, so NO certificate is tried");
+    if certificates::skipped() {
         return;
     }
-    let document =
-        fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/fleet.md")).unwrap();
-    let commands = blocks(&document, "sh").find(|block| block.contains("openssl")).unwrap();
+    let document = certificates::document("fleet.md");
     let (ours, theirs) = (TempDir::new().unwrap(), TempDir::new().unwrap());
     for folder in [&ours, &theirs] {
-        let made = Command::new("sh").args(["-ec", commands]).current_dir(folder).output().unwrap();
-        assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+        certificates::make(folder.path());
     }
     let port = free_port();
-    let configs: Vec<&str> = blocks(&document, "json5").collect();
+    let configs: Vec<&str> = certificates::blocks(&document, "json5").collect();
     let [router, member] = configs[..] else { panic!("{configs:?}") };
     // The document's own text, in this test's folders and at its port.
     let config = |text: &str, name: &str, change: &dyn Fn(String) -> String| {

@@ -1,10 +1,14 @@
 //! The server that a queue is on: how it is reached, and what it may not do.
 
+use std::error::Error;
+use std::fs::File;
+use std::io::{self, ErrorKind};
 use std::path::PathBuf;
 use std::time::Duration;
 
 use async_nats::jetstream::{self, Context};
 use async_nats::{ConnectErrorKind, ConnectOptions, ServerAddr};
+use percent_encoding::percent_decode_str;
 use tokio::runtime::{self, Runtime};
 
 /// How long a server may take for an answer.
@@ -40,7 +44,7 @@ pub enum QueueError {
     /// It lets us not in, or we do not believe it.
     #[error(
         "the NATS server at {url} and this machine do not trust each other: give user and password in --server, or \
-         --creds, and the authority of its certificate by --ca"
+         --creds, the authority of its certificate by --ca, and a certificate that it knows by --cert"
     )]
     Stranger {
         /// Where it is, without a password.
@@ -65,7 +69,7 @@ pub enum QueueError {
         /// The file.
         path: PathBuf,
         /// What the system said.
-        source: std::io::Error,
+        source: io::Error,
     },
     /// Anything else.
     #[error("the NATS server did not do as it was asked")]
@@ -93,6 +97,9 @@ pub(super) fn connect(server: &Server) -> Result<(Runtime, Context), QueueError>
             let read = options.credentials_file(path).await;
             options = read.map_err(|source| QueueError::File { path: path.clone(), source })?;
         }
+        for path in server.authority.iter().chain(server.identity.iter().flatten()) {
+            File::open(path).map_err(|source| QueueError::File { path: path.clone(), source })?;
+        }
         if let Some(path) = &server.authority {
             options = options.add_root_certificates(path.clone()).require_tls(true);
         }
@@ -100,16 +107,15 @@ pub(super) fn connect(server: &Server) -> Result<(Runtime, Context), QueueError>
             options = options.add_client_certificate(certificate.clone(), key.clone());
         }
         // The client itself passes over what an address says of the user.
-        if let Ok(address) = server.url.parse::<ServerAddr>()
-            && let (Some(user), Some(password)) = (address.username(), address.password())
-        {
-            options = options.user_and_password(user.into(), password.into());
+        if let Some([user, password]) = user_of(&server.url) {
+            options = options.user_and_password(user, password);
         }
         let url = without_password(&server.url);
         let client = options.connect(&server.url).await.map_err(|error| match error.kind() {
             ConnectErrorKind::Authentication
             | ConnectErrorKind::AuthorizationViolation
             | ConnectErrorKind::Tls => QueueError::Stranger { url, source: error.into() },
+            ConnectErrorKind::Io if is_distrust(&error) => QueueError::Stranger { url, source: error.into() },
             _ => QueueError::NoServer { url, source: error.into() },
         })?;
         let mut context = jetstream::new(client);
@@ -117,6 +123,24 @@ pub(super) fn connect(server: &Server) -> Result<(Runtime, Context), QueueError>
         Ok(context)
     });
     Ok((runtime, context?))
+}
+
+/// An error, and what it came of.
+fn causes<'a>(error: &'a (dyn Error + 'static)) -> impl Iterator<Item = &'a (dyn Error + 'static)> {
+    std::iter::successors(Some(error), |&error| error.source())
+}
+
+/// Whether a certificate ended it, which comes as what was read and is not valid.
+fn is_distrust(error: &(dyn Error + 'static)) -> bool {
+    let invalid = |error: &io::Error| error.kind() == ErrorKind::InvalidData;
+    causes(error).filter_map(|cause| cause.downcast_ref()).any(invalid)
+}
+
+/// User and password that an address names.
+fn user_of(url: &str) -> Option<[String; 2]> {
+    let address: ServerAddr = url.parse().ok()?;
+    let plain = |word: &str| percent_decode_str(word).decode_utf8_lossy().into_owned();
+    Some([address.username()?, address.password()?].map(plain))
 }
 
 /// An address as it may be shown.
@@ -128,8 +152,7 @@ fn without_password(url: &str) -> String {
 /// Why a stream cannot be had.
 pub(super) fn no_streams(error: impl Into<async_nats::Error>) -> QueueError {
     let source = error.into();
-    let causes = std::iter::successors(Some(&*source as &dyn std::error::Error), |error| error.source());
-    let says = causes.map(|error| error.to_string()).collect::<Vec<_>>().join(": ");
+    let says = causes(&*source).map(ToString::to_string).collect::<Vec<_>>().join(": ");
     if ["unavailable", "not enabled", "resource does not exist"].iter().any(|word| says.contains(word)) {
         QueueError::NoStreams
     } else {
@@ -140,6 +163,13 @@ pub(super) fn no_streams(error: impl Into<async_nats::Error>) -> QueueError {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_address_says_who_asks() {
+        let said = user_of("tls://one%40lab:two%20words@there:4222").unwrap();
+        assert_eq!(said, ["one@lab", "two words"]);
+        assert_eq!(user_of("nats://there:4222"), None);
+    }
 
     #[test]
     fn a_password_is_never_told() {

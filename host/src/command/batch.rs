@@ -33,7 +33,6 @@ mod work;
 use std::ffi::OsString;
 use std::path::PathBuf;
 
-use super::options::positive;
 use super::{Everywhere, Failure};
 
 /// Arguments of `batch`.
@@ -102,9 +101,10 @@ pub struct SubmitArgs {
     /// Which batch.
     #[command(flatten)]
     pub batch: BatchArgs,
-    /// Seconds without a sign of life after which a worker's pairs go to others
-    #[arg(long, value_name = "N", value_parser = positive, default_value_t = 30.0)]
-    pub lost_after: f64,
+    /// Seconds without a sign of life after which a worker's pairs go to others, 16 or more
+    // A sign of life may be a third of this old when a worker dies, and what it left may be swept ten seconds after.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(16..), default_value_t = 30)]
+    pub lost_after: u64,
     /// Options of `host replay` that say how a model is made
     #[arg(last = true, value_name = "OPTIONS")]
     pub how: Vec<OsString>,

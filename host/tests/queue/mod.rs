@@ -4,7 +4,7 @@ use host::random::Random;
 use image::{GrayImage, Luma};
 use serde_json::Value;
 use std::cell::RefCell;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io::Read;
 use std::net::{TcpListener, TcpStream};
@@ -35,6 +35,9 @@ pub(crate) const SMALL: Kind =
     Kind { size: "160x120", focal: "225", how: &["--no-pictures", "--resolution", "8"] };
 /// Pairs as a camera gives them.
 pub(crate) const FULL: Kind = Kind { size: "640x480", focal: "750", how: &["--no-pictures"] };
+
+/// What a server that asks for a password takes.
+pub(crate) const PASSWORD: &str = "one@two";
 
 /// Longest that a server may take to start or to end, and that workers may take beyond what is expected.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -98,22 +101,29 @@ pub(crate) fn replay(folder: &Path, out: &Path, threads: usize, kind: Kind) -> D
 pub(crate) struct Server {
     storage: TempDir,
     port: u16,
+    /// A folder with `queue.conf`, if it has one.
+    settings: Option<PathBuf>,
     process: Child,
 }
 
 impl Server {
-    /// A server on a free port of this machine alone.
+    /// A server on a free port of this machine alone, which lets everybody in.
     pub(crate) fn start() -> Self {
+        Self::start_as(None)
+    }
+
+    /// One that is set by the `queue.conf` of a folder, but for where it listens.
+    pub(crate) fn start_as(settings: Option<&Path>) -> Self {
         let storage = TempDir::new().unwrap();
         let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
-        let process = serve(storage.path(), port);
-        Self { storage, port, process }
+        let process = serve(storage.path(), port, settings);
+        Self { storage, port, settings: settings.map(PathBuf::from), process }
     }
 
     /// Kills it, and starts it again on what it kept.
     pub(crate) fn restart(&mut self) {
         end(&mut self.process);
-        self.process = serve(self.storage.path(), self.port);
+        self.process = serve(self.storage.path(), self.port, self.settings.as_deref());
     }
 
     /// Processor time that it took since it was started, as Linux counts it.
@@ -130,9 +140,14 @@ impl Server {
         files(self.storage.path()).values().map(Vec::len).sum()
     }
 
-    /// Where it is.
-    pub(crate) fn url(&self) -> String {
-        format!("nats://127.0.0.1:{}", self.port)
+    /// Where it is, as an option of the program.
+    pub(crate) fn place(&self) -> [String; 2] {
+        self.place_for("nats://")
+    }
+
+    /// The same for somebody: a scheme, and a user with a password and an @ behind.
+    pub(crate) fn place_for(&self, whom: &str) -> [String; 2] {
+        ["--server".into(), format!("{whom}localhost:{}", self.port)]
     }
 }
 
@@ -142,9 +157,15 @@ impl Drop for Server {
     }
 }
 
-fn serve(storage: &Path, port: u16) -> Child {
+fn serve(storage: &Path, port: u16, settings: Option<&Path>) -> Child {
     let mut command = Command::new("nats-server");
-    command.args(["-js", "-a", "127.0.0.1", "-p", &port.to_string(), "-sd"]).arg(storage);
+    command.args(["-a", "127.0.0.1", "-p", &port.to_string()]);
+    match settings {
+        None => command.args(["-js", "-sd"]).arg(storage),
+        Some(folder) => {
+            command.args(["-c", "queue.conf"]).current_dir(folder).env("WORKER_PASSWORD", PASSWORD)
+        }
+    };
     command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
     let process = command.spawn().expect("nats-server (Debian: apt-get install nats-server)");
     let end = Instant::now() + PATIENCE;
@@ -173,8 +194,8 @@ pub(crate) struct Batch<'a> {
     pub(crate) folder: &'a Path,
     /// The results.
     pub(crate) out: &'a Path,
-    /// The queue.
-    pub(crate) server: &'a str,
+    /// The queue: options that reach it.
+    pub(crate) server: &'a [String],
     /// Its name.
     pub(crate) name: &'a str,
     /// What its pairs are.
@@ -184,15 +205,23 @@ pub(crate) struct Batch<'a> {
 }
 
 impl Batch<'_> {
-    fn command(&self, action: &str, more: &[&str]) -> Vec<String> {
-        let folder = self.folder.display().to_string();
-        let all = ["batch", action, &folder, "--server", self.server, "--name", self.name, "--json"];
-        all.iter().chain(more).map(|&word| word.to_owned()).collect()
+    /// Whether it can be asked how far it is, or else why not.
+    pub(crate) fn try_status(&self) -> Result<(), String> {
+        let output = program(&words(&self.command("status", &[]))).stderr(Stdio::piped()).output().unwrap();
+        let told = String::from_utf8_lossy(&output.stderr).into_owned();
+        output.status.success().then_some(()).ok_or(told)
     }
 
-    /// Queues the pairs.
-    pub(crate) fn submit(&self, lost_after: &str) -> Value {
-        let more = [["--lost-after", lost_after, "--"].as_slice(), self.kind.how].concat();
+    fn command(&self, action: &str, more: &[&str]) -> Vec<String> {
+        let folder = self.folder.display().to_string();
+        let all = ["batch", action, &folder, "--name", self.name, "--json"];
+        let server = self.server.iter().map(String::as_str);
+        all.into_iter().chain(server).chain(more.iter().copied()).map(str::to_owned).collect()
+    }
+
+    /// Queues the pairs; who dies is noticed as soon as may be.
+    pub(crate) fn submit(&self) -> Value {
+        let more = [["--lost-after", "16", "--"].as_slice(), self.kind.how].concat();
         said(&words(&self.command("submit", &more)))
     }
 
@@ -276,8 +305,17 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     found
 }
 
+/// What was left in a folder is what was left in another; or the paths of what is not.
+pub(crate) fn same(one: &Path, other: &Path) -> Result<usize, String> {
+    let (one, other) = (results(one), results(other));
+    let paths: BTreeSet<_> = one.keys().chain(other.keys()).collect();
+    let count = paths.len();
+    let differ: Vec<_> = paths.into_iter().filter(|path| one.get(*path) != other.get(*path)).collect();
+    if differ.is_empty() { Ok(count) } else { Err(format!("{differ:?}")) }
+}
+
 /// What was left in a folder, by its path there: all files as they are, but of a report nothing from its times on.
-pub(crate) fn results(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+fn results(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = files(folder);
     for (_, bytes) in found.iter_mut().filter(|(path, _)| path.ends_with("report.json")) {
         let times = String::from_utf8_lossy(bytes).find("\"times_ms\"");

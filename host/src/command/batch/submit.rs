@@ -25,7 +25,7 @@ pub(super) fn run(args: &SubmitArgs, everywhere: &Everywhere, json: bool) -> Res
     for image in &found.alone {
         note(&format!("warning: {} has no partner", image.display()));
     }
-    let patience = Duration::from_secs_f64(args.lost_after);
+    let patience = Duration::from_secs(args.lost_after);
     let queue = Queue::create(&args.batch.server(), &name, patience)?;
     let bar = if std::io::stderr().is_terminal() {
         ProgressBar::new(found.pairs.len() as u64)
