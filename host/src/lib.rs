@@ -57,9 +57,11 @@ pub mod shape;
 pub mod view;
 pub mod bvh;
 pub mod random;
-#[cfg(all(test, any(feature = "batch", feature = "fleet")))]
-mod damaged;
 pub mod render;
 pub mod evaluate;
 pub mod baseline;
 pub mod experiment;
+
+// For tests.
+#[cfg(all(test, any(feature = "batch", feature = "fleet")))]
+mod damaged;
