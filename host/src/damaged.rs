@@ -32,7 +32,7 @@ const PIECES: [&[u8]; 24] = [
 
 /// A text with one to four places changed: a piece put in, a stretch taken out or repeated, a bit flipped, or its end
 /// cut off.
-pub fn damaged(text: &[u8], random: &mut Random) -> Vec<u8> {
+pub(crate) fn damaged(text: &[u8], random: &mut Random) -> Vec<u8> {
     let mut bytes = text.to_vec();
     for _ in 0..=random.bits() % 4 {
         let from = below(bytes.len() + 1, random);
