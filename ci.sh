@@ -198,12 +198,11 @@ part_fuzz() {
 }
 
 # Undefined behaviour, looked for by an interpreter in the core's tests, with words of 32 bits: elsewhere libm's square
-# root is assembly, which it cannot read. It takes long, so it is nobody's default; half a million divisions, longer.
+# root is assembly, which it cannot read. It takes minutes, and a nightly compiler, so it is nobody's default.
 part_miri() {
     toolchain "cargo +nightly miri --version" "install Rust with rustup (https://rustup.rs), which has Miri" \
         toolchain install nightly --component miri,rust-src
-    tests cargo +nightly miri test --locked -p shared --lib --target armv7-unknown-linux-gnueabihf \
-        -- --skip long_division_is_division
+    tests cargo +nightly miri test --locked -p shared --lib --target armv7-unknown-linux-gnueabihf
 }
 
 # A Python with Zenoh, as a foreign client.

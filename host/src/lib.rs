@@ -61,3 +61,7 @@ pub mod render;
 pub mod evaluate;
 pub mod baseline;
 pub mod experiment;
+
+// For tests.
+#[cfg(all(test, any(feature = "batch", feature = "fleet")))]
+mod damaged;

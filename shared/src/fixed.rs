@@ -128,6 +128,7 @@ pub const fn log2(x: u64) -> i32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::samples;
 
     #[test]
     fn rounding_division_is_symmetric() {
@@ -143,7 +144,7 @@ mod tests {
             seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             (seed >> 32) as u32
         };
-        for _ in 0..100_000 {
+        for _ in 0..samples(100_000, 1000) {
             let d = (random() >> (random() % 32)).max(1);
             let d = if random() % 4 == 0 { d | 0xFFFF_0000 } else { d };
             let high = random() % d;

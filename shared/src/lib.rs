@@ -64,3 +64,10 @@ pub mod pipeline;
 
 // What of it goes over a link.
 pub mod wire;
+
+/// How many of a test's samples are taken: all, or by an interpreter, which is thousands of times slower, so few that
+/// still take every path.
+#[cfg(test)]
+pub(crate) const fn samples(all: usize, interpreted: usize) -> usize {
+    if cfg!(miri) { interpreted } else { all }
+}

@@ -154,8 +154,8 @@ impl Scenario<'_> {
         self.said[what].as_u64().unwrap()
     }
 
-    fn seconds(&self, moment: &str) -> f64 {
-        fs::read_to_string(self.folder.join(moment)).unwrap().trim().parse().unwrap()
+    fn number(&self, file: &str) -> f64 {
+        fs::read_to_string(self.folder.join(file)).unwrap().trim().parse().unwrap()
     }
 
     fn latencies(&self) -> Vec<f64> {
@@ -247,9 +247,27 @@ fn a_camera_that_fails_or_goes_ends_the_run_and_leaves_whole_files() {
         assert!(scenario.said["error"].as_str().unwrap().contains(words), "{name}");
         machine.assert_intact(&scenario);
         assert!(!scenario.pairs().is_empty());
-        let took = scenario.seconds("end") - scenario.seconds("begin");
+        let took = scenario.number("end") - scenario.number("begin");
         assert!(took < PROMPT, "{name}: {took:.2} s");
     }
+}
+
+#[test]
+#[ignore = "boots a machine: ./ci.sh v4l2"]
+fn a_camera_that_comes_back_as_another_node_goes_on() {
+    let Some(machine) = machine() else { return };
+    let scenario = machine.scenario("replugged");
+    assert_eq!(scenario.code, 0, "{}", scenario.errors);
+    for words in ["/dev/video0 has been unplugged; waiting for it", "/dev/video0 is back as /dev/video2"] {
+        assert!(scenario.errors.contains(words), "{}", scenario.errors);
+    }
+    assert_eq!(scenario.count("returns"), 1);
+    // Of before and after, and none of what was under way is broken.
+    machine.assert_intact(&scenario);
+    let (before, all) = (scenario.number("before"), scenario.pairs().len());
+    assert!(before >= 1.0 && all as f64 > before + 3.0, "{all} pairs, {before} before");
+    let took = scenario.number("told") - scenario.number("begin");
+    assert!(took < PROMPT, "{took:.2} s");
 }
 
 #[test]

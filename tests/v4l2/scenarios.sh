@@ -38,12 +38,13 @@ capture() {
 
 # The same while something is done to camera 0 as soon as there is a model; ends by itself.
 capture_while() {
-    local name=$1 done=$2
+    local name=$1 done=$2 capture
     capture "$name" --device /dev/video0 --format GREY &
+    capture=$!
     await test -e "/out/$name/models/000001/model.ply"
     now >"/out/$name/begin"
     $done "$name"
-    wait $!
+    wait $capture
 }
 
 control() { v4l2-ctl -d "$1" -c "$2"; }
@@ -78,7 +79,9 @@ unfeed() {
     rm "/tmp/feeder-$1"
 }
 
-for camera in 0 2; do control $camera osd_text_mode=2,loop_video=1; done
+loop() { for camera in "$@"; do control "$camera" osd_text_mode=2,loop_video=1; done; }
+
+loop 0 2
 host list-devices --json >/out/devices.json
 
 # Two cameras, and one whose bytes are of the left and the right eye in turn.
@@ -128,7 +131,8 @@ control 0 percentage_of_dropped_buffers=100
 capture silent --device /dev/video0 --format GREY
 control 0 percentage_of_dropped_buffers=0
 
-more_models() { [ "$(ls "/out/$1/models" | wc -l)" -gt "$2" ]; }
+models() { ls "/out/$1/models" | wc -l; }
+more_models() { [ "$(models "$1")" -gt "$2" ]; }
 
 stall() {
     control 0 inject_v4l2_buf_flag_error=1
@@ -136,7 +140,7 @@ stall() {
     control 0 percentage_of_dropped_buffers=100
     sleep 3
     control 0 percentage_of_dropped_buffers=0
-    await more_models "$1" "$(($(ls "/out/$1/models" | wc -l) + 1))"
+    await more_models "$1" "$(($(models "$1") + 1))"
     kill -INT "$(pidof host)"
 }
 capture_while stalled stall
@@ -155,5 +159,25 @@ disconnect() { control 0 disconnect=1; }
 capture_while disconnected disconnect
 capture gone --device /dev/video0 --format GREY
 cat /dev/video0 >/out/gone.witness 2>&1
+feed 0 $BESIDE GREY GREY
+
+# The driver lets go of its cameras, and they come back as nodes 2 to 5, since 0 and 1 are held. The host sleeps until
+# its camera shows something again. A pair or two may be under way when it goes.
+replug() {
+    exec 9<>/dev/video0
+    echo vivid.0 >/sys/bus/platform/drivers/vivid/unbind
+    await grep -q "waiting for it" "/out/$1/err"
+    now >"/out/$1/told"
+    kill -STOP "$(pidof host)"
+    models "$1" >"/out/$1/before"
+    echo vivid.0 >/sys/bus/platform/drivers/vivid/bind
+    loop 2 4
+    feed 2 $BESIDE GREY GREY
+    kill -CONT "$(pidof host)"
+    await more_models "$1" "$(($(cat "/out/$1/before") + 3))"
+    kill -INT "$(pidof host)"
+}
+OPTICS="$CALIBRATED --wait 60"
+capture_while replugged replug
 
 echo "$(now) end"

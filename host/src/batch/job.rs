@@ -133,6 +133,8 @@ impl Sum {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::damaged::damaged;
+    use crate::random::Random;
     use std::fs;
 
     fn job() -> Job {
@@ -157,6 +159,27 @@ mod tests {
             assert!(matches!(Job::from_bytes(&read.to_bytes().unwrap()), Err(JobError::Outside)), "{path}");
         }
         assert!(matches!(Job::from_bytes(b"{}"), Err(JobError::Unknown(_))));
+    }
+
+    #[test]
+    fn whatever_a_queue_holds_is_refused_or_stays_within_the_folder() {
+        let (sound, mut random) = (job().to_bytes().unwrap(), Random::new(1));
+        let mut read = 0;
+        for _ in 0..20_000 {
+            match Job::from_bytes(&damaged(&sound, &mut random)) {
+                Err(error) => assert_eq!(error.to_string().lines().count(), 1),
+                Ok(job) => {
+                    let paths = job.files.iter().chain(&job.calibration).filter_map(|path| path.to_str());
+                    for path in paths.chain([job.name.as_str()]) {
+                        assert!(!path.starts_with('/') && path.split('/').all(|part| part != ".."), "{path}");
+                    }
+                    assert!(matches!(job.files.len(), 1 | 2));
+                    assert_eq!(Job::from_bytes(&job.to_bytes().unwrap()).unwrap(), job);
+                    read += 1;
+                }
+            }
+        }
+        assert!((1000..19_000).contains(&read), "{read} of 20000 are still pairs");
     }
 
     #[test]

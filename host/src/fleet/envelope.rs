@@ -79,6 +79,8 @@ pub fn new_run() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::damaged::damaged;
+    use crate::random::Random;
 
     #[test]
     fn an_envelope_is_read_as_it_was_written_and_others_are_refused() {
@@ -104,6 +106,26 @@ mod tests {
             let error = Envelope::from_bytes(text.as_bytes()).unwrap_err();
             assert!(error.contains(words), "{text}: {error}");
         }
+    }
+
+    #[test]
+    fn whatever_is_attached_is_refused_or_read_as_an_envelope_of_this_contract() {
+        let sound = br#"{"contract":1,"run":"0a1","number":17,"pair":18,"time_us":5,"age_ms":3}"#;
+        let (mut random, mut read) = (Random::new(1), 0);
+        for _ in 0..20_000 {
+            match Envelope::from_bytes(&damaged(sound, &mut random)) {
+                Err(error) => assert_eq!(error.lines().count(), 1, "{error}"),
+                Ok(envelope) => {
+                    assert_eq!(envelope.contract, CONTRACT);
+                    assert!(
+                        !envelope.run.is_empty() && envelope.run.chars().all(|c| c.is_ascii_alphanumeric())
+                    );
+                    assert_eq!(Envelope::from_bytes(&envelope.to_bytes()), Ok(envelope));
+                    read += 1;
+                }
+            }
+        }
+        assert!((500..19_500).contains(&read), "{read} of 20000 are still envelopes");
     }
 
     #[test]
