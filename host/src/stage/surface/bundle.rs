@@ -300,9 +300,9 @@ mod tests {
                 let mut sites = Sites::default();
                 let asked = AskSites { bundle, leaf, places: &cones, rounding: 1e-4, sites: &mut sites };
                 if is_widest {
-                    widest(asked)
+                    widest(asked);
                 } else {
-                    asked.run::<wide::f32x8>()
+                    asked.run::<wide::f32x8>();
                 }
                 let Sites { inside, moved, doubtful, places, outward, distances } = sites;
                 let vectors =
