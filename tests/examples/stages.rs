@@ -56,10 +56,10 @@ fn main() {
     let torus = times(folder.path(), "torus", Front::Balls);
     println!("\n| torus, 640x480 | ms |\n|---|---|");
     torus.iter().for_each(|(name, ms)| println!("| {name} | {ms:.2} |"));
-    println!("\n| ms | balls | grey | auto |\n|---|---|---|---|");
     let teapot = [Front::Balls, Front::Grey, Front::Auto].map(|front| {
         let (_, ms) = times(folder.path(), "teapot", front).pop().unwrap();
         format!("{ms:.0}")
     });
+    println!("\n| ms | balls | grey | auto |\n|---|---|---|---|");
     println!("| teapot, 640x480 | {} |", teapot.join(" | "));
 }
