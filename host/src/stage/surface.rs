@@ -12,7 +12,8 @@
 //! point, edge and tetrahedron belongs to one block and is worked out once (`mesher.rs`). Tetrahedra, because a plane
 //! cuts one in a triangle or a quadrilateral and nothing else: there is no ambiguous case, so the promise
 //! holds by construction instead of by repair (`docs/decisions/0003-isosurface.md`,
-//! `docs/decisions/0014-fast-isosurface.md`, `docs/decisions/0029-last-crossings.md`).
+//! `docs/decisions/0014-fast-isosurface.md`, `docs/decisions/0029-last-crossings.md`,
+//! `docs/decisions/0032-branches-foretold.md`).
 //!
 //! Cost: proportional to surface / cell². The result has the same bits for any number of threads.
 //! Not promised: features thinner than the cell may be missing, and concave creases are rounded by up to

@@ -11,22 +11,21 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use nalgebra::Point3;
-
 use super::{
-    bundle::{Apart, Bundle, Touching},
+    bundle::{Apart, Bundle, Sites, Touching},
     cone::Group,
-    lattice::{MAX_SHIFT, SIDE, point_of},
+    lattice::{MAX_SHIFT, SIDE},
     prune::{Answer, prune},
     region::{Level, Octant, Region, Solid},
 };
+use crate::lanes::LANES;
 
 /// A block takes about 2 kB with its cones, and about 6 kB of mesh, so that this many take 500 MB.
 pub(super) const MAX_BLOCKS: usize = 1 << 16;
 
 /// Points are moved to at least this distance off the surface, in cubes. Twice that is the most that one
 /// is moved: from just outside to inside.
-pub(super) const CLEAR: f64 = MAX_SHIFT / 2.0;
+pub(super) const CLEAR: f32 = MAX_SHIFT as f32 / 2.0;
 
 /// An edge that the surface cuts is up to a cube and two shifts long: so far off the surface its ends are.
 pub(super) const EDGE: f32 = 1.5;
@@ -64,6 +63,9 @@ pub(super) struct Grove {
     apart: Vec<Apart>,
     touching: Vec<Touching>,
     deciding: Vec<u32>,
+    sites: Sites,
+    /// Of the block that is added: where its points stand, if moved, by kind and leaf.
+    shifted: [[[[f32; LANES]; 3]; 8]; 2],
 }
 
 impl Grove {
@@ -93,7 +95,7 @@ impl Grove {
         let bundle = level.bundle(solid, region);
         if region.cubes == SIDE {
             if found.fetch_add(1, Ordering::Relaxed) < MAX_BLOCKS {
-                self.plant(solid, region, &bundle);
+                self.plant(region, &bundle);
             }
             return;
         }
@@ -107,7 +109,7 @@ impl Grove {
     }
 
     /// Adds the block that is `region`.
-    fn plant(&mut self, solid: &Solid, region: Region, bundle: &Bundle) {
+    fn plant(&mut self, region: Region, bundle: &Bundle) {
         let mut block = Block {
             corner: region.corner,
             inside: [0; 2],
@@ -117,37 +119,33 @@ impl Grove {
             first_place: [self.places.len() as u32; 9],
         };
         self.groups.extend(bundle.groups);
-        let mut shifted = [[[0.0; 3]; 64]; 2];
-        let leaves = bundle.leaves(CLEAR as f32, &mut self.apart, &mut self.touching);
-        let deciding = &mut self.deciding;
+        let leaves = bundle.leaves(&mut self.apart, &mut self.touching);
+        let [mut end, most] = [self.places.len(), self.touching.len()];
+        self.places.resize(end + 8 * most, 0);
+        self.deciding.resize(most, 0);
         for octant in 0..8 {
             if leaves.whole >> octant & 1 == 1 {
                 let inside = u64::from(leaves.inside >> octant & 1) * 0xff;
                 block.inside.iter_mut().for_each(|bits| *bits |= inside << (8 * octant));
-                block.first_place[octant + 1] = block.first_place[octant];
+                block.first_place[octant + 1] = end as u32;
                 continue;
             }
-            list(&self.touching, |touching| touching.leaves >> octant, &mut self.places);
-            block.first_place[octant + 1] = self.places.len() as u32;
-            deciding.clear();
-            list(&self.touching, |touching| touching.points >> octant, deciding);
-            let sites = bundle.nearest_of_sites(octant, &leaves, deciding, CLEAR as f32);
-            let mut inside = sites.inside;
-            for i in bits(sites.near.into()) {
-                let (kind, bit) = (i >> 3, (8 * octant) | (i & 7));
-                let unmoved = solid.lattice.position(point_of(region.corner, bit, kind));
-                let Some(site) = bundle.site(unmoved, sites.cones[i], sites.others[i], solid) else {
-                    continue;
-                };
-                inside = inside & !(1 << i) | u32::from(site.inside) << i;
-                block.moved[kind] |= 1 << bit;
-                shifted[kind][bit] = bundle.offset(&site.position, solid.lattice.cube);
+            let places = &mut self.places[end..];
+            end += list(&self.touching, |touching| touching.leaves >> octant, places);
+            block.first_place[octant + 1] = end as u32;
+            let count = list(&self.touching, |touching| touching.points >> octant, &mut self.deciding);
+            let sites = &mut self.sites;
+            bundle.ask_sites(octant, &leaves, &self.deciding[..count], sites);
+            for kind in 0..2 {
+                let byte = |bits: u32| u64::from(bits >> (LANES * kind) & 0xff) << (8 * octant);
+                block.inside[kind] |= byte(sites.inside);
+                block.moved[kind] |= byte(sites.moved);
+                self.shifted[kind][octant] = sites.places[kind];
             }
-            block.inside[0] |= u64::from(inside & 0xff) << (8 * octant);
-            block.inside[1] |= u64::from(inside >> 8) << (8 * octant);
         }
-        for (set, places) in block.moved.iter().zip(&shifted) {
-            self.moved.extend(bits(*set).map(|bit| places[bit]));
+        self.places.truncate(end);
+        for (set, places) in block.moved.iter().zip(&self.shifted) {
+            self.moved.extend(bits(*set).map(|bit| places[bit / LANES].map(|along| along[bit % LANES])));
         }
         self.blocks.push(block);
     }
@@ -166,16 +164,15 @@ impl Grove {
     }
 }
 
-/// Appends the places of the cones of which the last bit is set.
-fn list(touching: &[Touching], bit: impl Fn(&Touching) -> u8, places: &mut Vec<u32>) {
+/// Lists the places of the cones of which the last bit is set, and returns how many these are.
+fn list(touching: &[Touching], bit: impl Fn(&Touching) -> u8, places: &mut [u32]) -> usize {
     // Without a branch, as nobody could foretell it.
-    let mut end = places.len();
-    places.resize(end + touching.len(), 0);
+    let mut end = 0;
     for (place, touching) in touching.iter().enumerate() {
         places[end] = place as u32;
         end += usize::from(bit(touching) & 1);
     }
-    places.truncate(end);
+    end
 }
 
 /// The places of the ones of a word.
@@ -190,33 +187,19 @@ pub(super) fn bits(mut word: u64) -> impl Iterator<Item = usize> {
     })
 }
 
-/// A lattice point near the surface, moved off it.
-struct Site {
-    position: Point3<f64>,
-    inside: bool,
-}
-
-impl Bundle<'_> {
-    /// Where a point near the surface, of which `cone` decides, is clear of it; nothing if it stays where
-    /// it is. All other cones are at least `others` cubes off.
-    fn site(&self, position: Point3<f64>, cone: u32, others: f32, solid: &Solid) -> Option<Site> {
-        let (cube, deciding) = (solid.lattice.cube, &solid.distances[cone as usize]);
-        let (from_centre, radius) = deciding.nearest_ball(&position);
-        let far = from_centre.norm();
-        let distance = (far - radius) / cube;
-        if distance.abs() >= CLEAR || far == 0.0 {
-            return None;
-        }
-        let outward = from_centre / far;
-        // Away from the surface; but from a crease outward there is no getting away, only inward.
-        [CLEAR.copysign(distance), -CLEAR].into_iter().find_map(|target| {
-            let position = position + outward * ((target - distance) * cube);
-            let own = deciding.at(&position) / cube;
-            let alone = own < f64::from(others) - MAX_SHIFT;
-            let distance = if alone { own } else { self.nearest(&position, cube).into() };
-            (distance.abs() > 0.99 * CLEAR).then_some(Site { position, inside: distance < 0.0 })
+/// As [`bits`], but four at a time: how many there are can hardly be foretold, how many fours mostly. After the last one
+/// there are 64s.
+#[inline(always)]
+pub(super) fn fours(mut word: u64) -> impl Iterator<Item = [usize; 4]> {
+    std::iter::from_fn(move || {
+        (word != 0).then(|| {
+            [(); 4].map(|()| {
+                let bit = word.trailing_zeros() as usize;
+                word &= word.wrapping_sub(1);
+                bit
+            })
         })
-    }
+    })
 }
 
 #[cfg(test)]
@@ -224,9 +207,14 @@ pub(super) mod tests {
     use super::*;
     use crate::lanes::Floats;
     use crate::stage::surface::{
-        RoundCone, cone::Cone, distance::Distance, lattice::Lattice, region::reach, vectors::all,
+        RoundCone,
+        cone::Cone,
+        distance::Distance,
+        lattice::{Lattice, tests::point_of},
+        region::reach,
+        vectors::all,
     };
-    use nalgebra::Vector3;
+    use nalgebra::{Point3, Vector3};
     use wide::f32x8;
 
     /// Thirty cones in 20 mm, thick and thin, some along the axes.
@@ -293,7 +281,7 @@ pub(super) mod tests {
                     let way = (p - unmoved).norm();
                     assert!(way <= MAX_SHIFT * solid.lattice.cube * (1.0 + 1e-5), "{way}");
                     if way > 0.0 {
-                        assert!(least.abs() > 0.99 * CLEAR * solid.lattice.cube);
+                        assert!(least.abs() > 0.99 * f64::from(CLEAR) * solid.lattice.cube);
                         moved += 1;
                     }
                 }

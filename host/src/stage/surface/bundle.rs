@@ -3,13 +3,12 @@
 //! The cones are asked in single precision, in lengths of a lattice cube from the middle of their region, so that what
 //! is far off is as exact as what is near: eight cones about one point, or one about eight points.
 
-use nalgebra::Point3;
-
 use super::{
+    block::{CLEAR, bits},
     cone::{Cone, Group},
     lattice::MAX_SHIFT,
     region::reach,
-    vectors::{Vectors, all, load, plus},
+    vectors::{Vectors, all, choose, load, plus, store, times},
 };
 use crate::{
     lanes::{Floats, LANES, Work},
@@ -19,9 +18,6 @@ use crate::{
 /// What single precision may be wrong by, as a share of the lengths that it adds up.
 pub(super) const ROUNDING: f32 = 4e-6;
 
-/// Points of a leaf, in [`Bundle::nearest_of_sites`].
-pub(super) const SITES: usize = 16;
-
 /// Cones around the middle of a region.
 #[derive(Clone, Copy)]
 pub(super) struct Bundle<'a> {
@@ -29,8 +25,6 @@ pub(super) struct Bundle<'a> {
     pub(super) cones: &'a [u32],
     /// Of them, see [`prepare`](super::cone::prepare).
     pub(super) groups: &'a [Group],
-    /// The middle of the region, mm.
-    pub(super) middle: Point3<f64>,
 }
 
 /// Offsets of the leaves' middles from that of their block, in cubes: of all that belongs to them, and of their points.
@@ -39,7 +33,7 @@ const LEAVES_POINTS: [[f32; LANES]; 3] = offsets(-1.25, 2.0);
 
 /// Offsets of the points of a leaf from its middle, in cubes: corners of cubes, and middles.
 const OFFSETS: [[[f32; LANES]; 3]; KINDS] = [offsets(-1.0, 1.0), offsets(-0.5, 1.0)];
-const KINDS: usize = SITES / LANES;
+const KINDS: usize = 2;
 
 /// The corners of a cube, from its lowest one to `step` further.
 const fn offsets(lowest: f32, step: f32) -> [[f32; LANES]; 3] {
@@ -79,47 +73,64 @@ pub(super) struct Touching {
 /// How far a cone is from the middles of a block's leaves, and from the middles of their points, cubes.
 pub(super) type Apart = [[f32; LANES]; 2];
 
-/// What the union is at the points of a leaf.
+/// What the union is at the points of a leaf, a bit each: by kind, then by place.
+#[derive(Debug, Default)]
 pub(super) struct Sites {
-    /// The ids of the cones that decide.
-    pub(super) cones: [u32; SITES],
-    /// How far all other cones are at least, cubes.
-    pub(super) others: [f32; SITES],
-    /// The points that are inside, and those so near to the surface that rounding or a move may change that.
+    /// The points that are inside, and those that have been moved off the surface.
     pub(super) inside: u32,
-    pub(super) near: u32,
+    pub(super) moved: u32,
+    /// Where the points are that have been moved, from the middle of the block, cubes.
+    pub(super) places: [[[f32; LANES]; 3]; KINDS],
+    /// Those that would have to be moved, but then another cone may be the nearest.
+    doubtful: u32,
+    /// Before any move: the signed distances, cubes, and how they grow.
+    distances: [[f32; LANES]; KINDS],
+    outward: [[[f32; LANES]; 3]; KINDS],
 }
 
 impl Bundle<'_> {
     /// What the cones say about the leaves of a block whose middle is the bundle's. In `touching` is put which leaves
-    /// each cone touches; those that come within `clear` cubes of a point may decide there. `apart` is room to work in.
-    pub(super) fn leaves(&self, clear: f32, apart: &mut Vec<Apart>, touching: &mut Vec<Touching>) -> Leaves {
-        widest(AskLeaves { bundle: self, clear, apart, touching })
+    /// each cone touches. `apart` is room to work in.
+    pub(super) fn leaves(&self, apart: &mut Vec<Apart>, touching: &mut Vec<Touching>) -> Leaves {
+        widest(AskLeaves { bundle: self, apart, touching })
     }
 
-    /// What the cones at `places` say about the points of a leaf. Those within `clear` cubes of the surface, to
-    /// within rounding, are near; rounding is that of the cone of the block whose ball is furthest from the leaf.
-    pub(super) fn nearest_of_sites(&self, leaf: usize, leaves: &Leaves, places: &[u32], clear: f32) -> Sites {
+    /// Puts in `sites` what the cones at `places` say about the points of a leaf. Rounding is that of the cone of the
+    /// block whose ball is furthest from the leaf.
+    pub(super) fn ask_sites(&self, leaf: usize, leaves: &Leaves, places: &[u32], sites: &mut Sites) {
         let rounding = (leaves.furthest[leaf] + 4.0) * 8.0 * ROUNDING;
-        widest(AskSites { bundle: self, leaf, places, clear, rounding })
+        widest(AskSites { bundle: self, leaf, places, rounding, sites });
+        for i in bits(sites.doubtful.into()) {
+            self.settle(sites, leaf, i);
+        }
     }
 
-    /// Where `p` is from the middle, in cubes of `cube` mm.
-    pub(super) fn offset(&self, p: &Point3<f64>, cube: f64) -> [f32; 3] {
-        let scale = 1.0 / cube;
-        [0, 1, 2].map(|axis| ((p[axis] - self.middle[axis]) * scale) as f32)
-    }
-
-    /// Signed distance of `p` to the union, in cubes of `cube` mm, to within rounding.
-    pub(super) fn nearest(&self, p: &Point3<f64>, cube: f64) -> f32 {
-        widest(Nearest { groups: self.groups, offset: self.offset(p, cube) })
+    /// Moves a point that is doubtful, if it can be moved.
+    fn settle(&self, sites: &mut Sites, leaf: usize, i: usize) {
+        let (kind, lane) = (i / LANES, i % LANES);
+        let distance = sites.distances[kind][lane];
+        // Away from the surface; but from a crease outward there is no getting away, only inward.
+        for target in [CLEAR.copysign(distance), -CLEAR] {
+            let place = [0, 1, 2].map(|axis| {
+                let outward = sites.outward[kind][axis][lane];
+                LEAVES[axis][leaf] + OFFSETS[kind][axis][lane] + outward * (target - distance)
+            });
+            let distance = widest(AskPlace { groups: self.groups, offset: place });
+            if distance.abs() > 0.99 * CLEAR {
+                sites.inside = sites.inside & !(1 << i) | u32::from(distance < 0.0) << i;
+                sites.moved |= 1 << i;
+                for (along, place) in sites.places[kind].iter_mut().zip(place) {
+                    along[lane] = place;
+                }
+                return;
+            }
+        }
     }
 }
 
 /// See [`Bundle::leaves`].
 struct AskLeaves<'a> {
     bundle: &'a Bundle<'a>,
-    clear: f32,
     apart: &'a mut Vec<Apart>,
     touching: &'a mut Vec<Touching>,
 }
@@ -148,7 +159,7 @@ impl Work for AskLeaves<'_> {
         // A cone that is nowhere the nearest, or touches nothing, decides nothing.
         let bound = (own + L::splat(2.0 * REACH)).min(L::splat(REACH)) + rounding;
         let points_bound =
-            (of_points + L::splat(2.0 * POINTS_REACH)).min(L::splat(POINTS_REACH + self.clear)) + rounding;
+            (of_points + L::splat(2.0 * POINTS_REACH)).min(L::splat(POINTS_REACH + CLEAR)) + rounding;
         for [distance, of_points] in &*self.apart {
             let leaves = L::load(distance).is_below(bound).bits() & surface;
             let points = L::load(of_points).is_below(points_bound).bits() & surface;
@@ -158,57 +169,93 @@ impl Work for AskLeaves<'_> {
     }
 }
 
-/// See [`Bundle::nearest_of_sites`].
+/// See [`Bundle::ask_sites`].
 struct AskSites<'a> {
     bundle: &'a Bundle<'a>,
     leaf: usize,
     places: &'a [u32],
-    clear: f32,
     rounding: f32,
+    sites: &'a mut Sites,
 }
 
 impl Work for AskSites<'_> {
-    type Output = Sites;
+    type Output = ();
 
     #[inline(always)]
-    fn run<L: Floats>(self) -> Sites {
+    fn run<L: Floats>(self) {
         let middle = all([0, 1, 2].map(|axis| LEAVES[axis][self.leaf]));
         let offsets: [Vectors<L>; KINDS] = [plus(load(&OFFSETS[0]), middle), plus(load(&OFFSETS[1]), middle)];
-        let mut nearest = [L::splat(f32::INFINITY); KINDS];
-        let mut others = nearest;
-        // As numbers, which are exact for all that there is memory for.
-        let mut deciding = [L::splat(0.0); KINDS];
+        let mut nearest = [Nearest::<L>::none(); KINDS];
         for &place in self.places {
             let cone = Cone::<L>::of(self.bundle.groups, place as usize);
-            for i in 0..KINDS {
-                let (distance, _) = cone.at(offsets[i]);
-                others[i] = distance.max(nearest[i]).min(others[i]);
-                deciding[i] = distance.is_below(nearest[i]).choose(L::splat(place as f32), deciding[i]);
-                nearest[i] = distance.min(nearest[i]);
+            for (nearest, offsets) in nearest.iter_mut().zip(offsets) {
+                nearest.see(&cone, offsets);
             }
         }
-        let mut sites = Sites { cones: [0; SITES], others: [0.0; SITES], inside: 0, near: 0 };
-        let (zero, rounding) = (L::splat(0.0), L::splat(self.rounding));
-        for i in 0..KINDS {
-            let near = nearest[i].max(zero - nearest[i]).is_below(rounding + L::splat(self.clear));
-            sites.inside |= nearest[i].is_below(zero).bits() << (LANES * i);
-            sites.near |= near.bits() << (LANES * i);
-            sites.others.as_chunks_mut().0[i] = (others[i] - rounding).store();
-            for (cone, place) in sites.cones[LANES * i..].iter_mut().zip(deciding[i].store()) {
-                *cone = self.bundle.cones[place as usize];
-            }
+        let sites = self.sites;
+        (sites.inside, sites.moved, sites.doubtful) = (0, 0, 0);
+        let (zero, clear) = (L::splat(0.0), L::splat(CLEAR));
+        for (i, (nearest, offsets)) in nearest.into_iter().zip(offsets).enumerate() {
+            let Nearest { distance, from_centre, far, others } = nearest;
+            let inside = distance.is_below(zero);
+            let target = inside.choose(zero - clear, clear);
+            let shift = target - distance;
+            let way = shift.max(zero - shift);
+            let near = distance.max(zero - distance).is_below(clear);
+            // The cone that decides decides after the move too, by the same ball.
+            let alone =
+                (target + way + L::splat(self.rounding)).is_below(others).and(zero.is_below(far + shift));
+            let outward = times(from_centre, L::splat(1.0) / far.max(L::splat(f32::MIN_POSITIVE)));
+            sites.inside |= inside.bits() << (LANES * i);
+            sites.moved |= near.and(alone).bits() << (LANES * i);
+            sites.doubtful |= near.bits() << (LANES * i);
+            sites.places[i] = store(plus(offsets, times(outward, shift)));
+            sites.distances[i] = distance.store();
+            sites.outward[i] = store(outward);
         }
-        sites
+        sites.doubtful &= !sites.moved;
     }
 }
 
-/// See [`Bundle::nearest`].
-struct Nearest<'a> {
+/// What is the nearest of the cones that eight points have been asked about.
+#[derive(Clone, Copy)]
+struct Nearest<L> {
+    /// Signed distance, cubes.
+    distance: L,
+    /// From the centre of the ball that decides it, cubes.
+    from_centre: Vectors<L>,
+    far: L,
+    /// The signed distance of all other cones at least, cubes.
+    others: L,
+}
+
+impl<L: Floats> Nearest<L> {
+    #[inline(always)]
+    fn none() -> Self {
+        let (zero, infinite) = (L::splat(0.0), L::splat(f32::INFINITY));
+        Self { distance: infinite, from_centre: [zero; 3], far: zero, others: infinite }
+    }
+
+    #[inline(always)]
+    fn see(&mut self, cone: &Cone<L>, offsets: Vectors<L>) {
+        let (from_centre, square, radius) = cone.balls(offsets);
+        let far = square.sqrt();
+        let distance = far - radius;
+        let nearer = distance.is_below(self.distance);
+        self.others = distance.max(self.distance).min(self.others);
+        self.from_centre = choose(nearer, from_centre, self.from_centre);
+        self.far = nearer.choose(far, self.far);
+        self.distance = distance.min(self.distance);
+    }
+}
+
+/// The signed distance of a place to the union, cubes, to within rounding.
+struct AskPlace<'a> {
     groups: &'a [Group],
     offset: [f32; 3],
 }
 
-impl Work for Nearest<'_> {
+impl Work for AskPlace<'_> {
     type Output = f32;
 
     #[inline(always)]
@@ -216,7 +263,7 @@ impl Work for Nearest<'_> {
         let offset = all::<L>(self.offset);
         let mut least = L::splat(f32::INFINITY);
         for group in self.groups {
-            let (_, square, radius) = group.balls(offset);
+            let (_, square, radius) = Cone::each(group).balls(offset);
             least = (square.sqrt() - radius).min(least);
         }
         least.store().into_iter().fold(f32::INFINITY, f32::min)
@@ -226,19 +273,21 @@ impl Work for Nearest<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Point3;
+
     use crate::stage::surface::{block::tests::cones, cone::prepare, distance::Distance};
 
     #[test]
-    fn all_lanes_say_the_same_about_leaves() {
+    fn all_lanes_say_the_same_about_leaves_and_points() {
         let distances: Vec<Distance> = cones().iter().map(Distance::to).collect();
         let cones: Vec<u32> = (0..distances.len() as u32).collect();
         for cube in [0.5, 0.7, 3.0] {
             let (mut groups, middle) = (Vec::new(), Point3::new(8.0, 7.0, 6.0));
             prepare(&cones, &distances, &middle, cube, &mut groups);
-            let bundle = &Bundle { cones: &cones, groups: &groups, middle };
+            let bundle = &Bundle { cones: &cones, groups: &groups };
             let ask = |is_widest| {
                 let (mut apart, mut touching) = (Vec::new(), Vec::new());
-                let asked = AskLeaves { bundle, clear: 0.12, apart: &mut apart, touching: &mut touching };
+                let asked = AskLeaves { bundle, apart: &mut apart, touching: &mut touching };
                 let leaves = if is_widest { widest(asked) } else { asked.run::<wide::f32x8>() };
                 let distances = apart.as_flattened().as_flattened().iter().map(|x| x.to_bits());
                 let touching: Vec<_> =
@@ -247,6 +296,22 @@ mod tests {
                 (distances.collect::<Vec<_>>(), touching, leaves.whole, leaves.inside, furthest)
             };
             assert_eq!(ask(true), ask(false), "{cube}");
+            let ask = |leaf, is_widest| {
+                let mut sites = Sites::default();
+                let asked = AskSites { bundle, leaf, places: &cones, rounding: 1e-4, sites: &mut sites };
+                if is_widest {
+                    widest(asked);
+                } else {
+                    asked.run::<wide::f32x8>();
+                }
+                let Sites { inside, moved, doubtful, places, outward, distances } = sites;
+                let vectors =
+                    [places, outward].map(|all| all.map(|axes| axes.map(|along| along.map(f32::to_bits))));
+                (inside, moved, doubtful, vectors, distances.map(|all| all.map(f32::to_bits)))
+            };
+            for leaf in 0..8 {
+                assert_eq!(ask(leaf, true), ask(leaf, false), "{cube} {leaf}");
+            }
         }
     }
 }

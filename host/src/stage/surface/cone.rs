@@ -71,23 +71,6 @@ impl Group {
         }
         group
     }
-
-    /// As seen from the centres of the balls that decide the distances of a point at `offset` from the middle: the
-    /// point, the squares of how far that is, and the radii.
-    #[inline(always)]
-    pub(super) fn balls<L: Floats>(&self, offset: Vectors<L>) -> (Vectors<L>, L, L) {
-        let p = plus(load(&self.middle), offset);
-        let radius = L::load(&self.radius);
-        if self.are_balls {
-            return (p, dot(p, p), radius);
-        }
-        let axis = load(&self.axis);
-        let along = dot(p, axis);
-        let away = (dot(p, p) - along * along).max(L::splat(0.0));
-        let extent = [L::load(&self.low), L::load(&self.high), L::load(&self.lean)];
-        let (square, s) = nearest_ball(along, away, extent);
-        (less(p, axis, s), square, radius + L::load(&self.slope) * s)
-    }
 }
 
 /// Appends the groups of `cones`, as seen from `middle`, with cubes of `cube` mm.
@@ -101,7 +84,7 @@ pub(super) fn prepare(
     groups.extend(cones.chunks(LANES).map(|cones| Group::of(cones, all, middle, 1.0 / cube)));
 }
 
-/// One cone of a group, eight times.
+/// The cones of a group, or one of them eight times.
 pub(super) struct Cone<L> {
     /// See [`Group`].
     pub(super) middle: Vectors<L>,
@@ -110,20 +93,30 @@ pub(super) struct Cone<L> {
     pub(super) high: L,
     pub(super) radius: L,
     pub(super) slope: L,
-    lean: L,
-    /// 1 less the square of the slope, and 1 divided by that.
-    pub(super) flat: L,
-    pub(super) steep: L,
+    pub(super) lean: L,
     pub(super) is_ball: bool,
 }
 
 impl<L: Floats> Cone<L> {
-    /// The cone at a place in the list.
+    /// Those of a group.
+    #[inline(always)]
+    pub(super) fn each(group: &Group) -> Self {
+        Self {
+            middle: load(&group.middle),
+            axis: load(&group.axis),
+            low: L::load(&group.low),
+            high: L::load(&group.high),
+            radius: L::load(&group.radius),
+            slope: L::load(&group.slope),
+            lean: L::load(&group.lean),
+            is_ball: group.are_balls,
+        }
+    }
+
+    /// The one at a place in the list.
     #[inline(always)]
     pub(super) fn of(groups: &[Group], place: usize) -> Self {
         let (group, lane) = (&groups[place / LANES], place % LANES);
-        let lean = group.lean[lane];
-        let steep = 1.0 + lean * lean;
         let of = |lanes: &[f32; LANES]| L::splat(lanes[lane]);
         Self {
             middle: [of(&group.middle[0]), of(&group.middle[1]), of(&group.middle[2])],
@@ -132,35 +125,32 @@ impl<L: Floats> Cone<L> {
             high: of(&group.high),
             radius: of(&group.radius),
             slope: of(&group.slope),
-            lean: L::splat(lean),
-            flat: L::splat(1.0 / steep),
-            steep: L::splat(steep),
+            lean: of(&group.lean),
             is_ball: group.low[lane] == group.high[lane],
         }
+    }
+
+    /// As seen from the centres of the balls that decide the distances of points: the points, the squares of how far
+    /// that is, and the radii.
+    #[inline(always)]
+    pub(super) fn balls(&self, offsets: Vectors<L>) -> (Vectors<L>, L, L) {
+        let p = plus(self.middle, offsets);
+        let square = dot(p, p);
+        if self.is_ball {
+            return (p, square, self.radius);
+        }
+        let along = dot(p, self.axis);
+        let away = (square - along * along).max(L::splat(0.0));
+        let s = (along + self.lean * away.sqrt()).min(self.high).max(self.low);
+        let short = along - s;
+        (less(p, self.axis, s), short * short + away, self.radius + self.slope * s)
     }
 
     /// Signed distances, and how far the centres of the balls that decide them are.
     #[inline(always)]
     pub(super) fn at(&self, offsets: Vectors<L>) -> (L, L) {
-        let p = plus(self.middle, offsets);
-        let square = dot(p, p);
-        if self.is_ball {
-            let far = square.sqrt();
-            return (far - self.radius, far);
-        }
-        let along = dot(p, self.axis);
-        let away = (square - along * along).max(L::splat(0.0));
-        let (square, s) = nearest_ball(along, away, [self.low, self.high, self.lean]);
+        let (_, square, radius) = self.balls(offsets);
         let far = square.sqrt();
-        (far - (self.radius + self.slope * s), far)
+        (far - radius, far)
     }
-}
-
-/// The square of how far a point is from the centre of the ball that decides its distance, and where on the
-/// axis that is; from where the point is along the axis, and the square of how far away from it.
-#[inline(always)]
-pub(super) fn nearest_ball<L: Floats>(along: L, away: L, [low, high, lean]: [L; 3]) -> (L, L) {
-    let s = (along + lean * away.sqrt()).min(high).max(low);
-    let short = along - s;
-    (short * short + away, s)
 }

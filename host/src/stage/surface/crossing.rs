@@ -10,11 +10,11 @@
 use nalgebra::{Point3, Vector3};
 
 use super::{
-    block::bits,
+    block::fours,
     cone::Cone,
     lattice::{EDGES, ENDS, SIDE},
     near::{PLACES, Points},
-    patch::{Blocks, Cut},
+    patch::{Blocks, Cut, Edges},
     region::{Region, Solid},
     vectors::{Vectors, dot, less, plus, store, times},
 };
@@ -27,38 +27,40 @@ const END: f32 = 0.02;
 /// Edges that may be cut in a leaf.
 const MOST: usize = 8 * EDGES;
 
-/// The edges of a block that are cut, by leaf.
+/// The edges of a block that are cut, by leaf, and beyond the last leaf what is none.
 #[derive(Debug)]
 pub(super) struct Sorted {
-    counts: [usize; 8],
+    counts: [usize; 9],
     /// The places of the ends, that inside first; what is beyond the last edge of a leaf is of others.
-    ends: [[[u8; 2]; MOST]; 8],
+    ends: [[[u8; 2]; MOST]; 9],
     /// The numbers of the vertices, from the block's first.
-    numbers: [[u16; MOST]; 8],
+    numbers: [[u16; MOST]; 9],
 }
 
 impl Default for Sorted {
     fn default() -> Self {
-        Self { counts: [0; 8], ends: [[[0; 2]; MOST]; 8], numbers: [[0; MOST]; 8] }
+        Self { counts: [0; 9], ends: [[[0; 2]; MOST]; 9], numbers: [[0; MOST]; 9] }
     }
 }
 
 impl Sorted {
     #[inline(always)]
-    fn fill(&mut self, edges: &[u64; EDGES], inside: [u64; 2]) {
-        self.counts = [0; 8];
+    fn fill(&mut self, edges: &[Edges; EDGES], inside: [u64; 2]) {
+        self.counts = [0; 9];
         let mut number = 0;
-        for (&[first, second], &edges) in ENDS.iter().zip(edges) {
+        for (&[first, second], edges) in ENDS.iter().zip(edges) {
             let [start, end] = [Points::offset(first), Points::offset(second)];
-            for bit in bits(edges) {
-                let leaf = bit >> 3 & 7;
-                let count = self.counts[leaf];
-                let [start, end] = [(PLACES[bit] + start) as u8, (PLACES[bit] + end) as u8];
-                let outward = inside[first.kind] >> bit & 1 == 1;
-                self.ends[leaf][count] = if outward { [start, end] } else { [end, start] };
-                self.numbers[leaf][count] = number;
-                self.counts[leaf] = count + 1;
-                number += 1;
+            for four in fours(edges.cubes) {
+                for bit in four {
+                    let leaf = bit / 8;
+                    let count = self.counts[leaf];
+                    let [start, end] = [(PLACES[bit] + start) as u8, (PLACES[bit] + end) as u8];
+                    let outward = inside[first.kind] >> (bit % 64) & 1 == 1;
+                    self.ends[leaf][count] = if outward { [start, end] } else { [end, start] };
+                    self.numbers[leaf][count] = number;
+                    self.counts[leaf] = count + 1;
+                    number += u16::from(leaf < 8);
+                }
             }
         }
     }
@@ -133,13 +135,16 @@ impl<L: Floats> Crossings<L> {
         if cone.is_ball {
             return self.leave_at(exit(a, b, c));
         }
+        // 1 divided by what is left of 1 by the square of the slope.
+        let steep = L::splat(1.0) + cone.lean * cone.lean;
+        let flat = L::splat(1.0) / steep;
         let ahead = dot(self.step, cone.axis);
         let base = dot(from, cone.axis) + cone.slope * cone.radius;
-        let (deepest, moved) = (base * cone.steep, ahead * cone.steep);
+        let (deepest, moved) = (base * steep, ahead * steep);
         let place = deepest + moved * exit(a - ahead * moved, b - base * moved, c - base * deepest);
         let between = cone.low.is_at_most(place).and(place.is_at_most(cone.high));
         for s in [cone.low, cone.high, between.choose(place, cone.low)] {
-            self.leave_at(exit(a, b - ahead * s, c - (base + base - cone.flat * s) * s));
+            self.leave_at(exit(a, b - ahead * s, c - (base + base - flat * s) * s));
         }
     }
 

@@ -44,30 +44,22 @@ impl Distance {
         let lean = slope / (1.0 - slope * slope).sqrt();
         Self { start, axis: (end - start) / length, length, radius, slope, lean }
     }
-
-    /// Signed distance from `p` to the surface, mm: negative inside.
-    pub(super) fn at(&self, p: &Point3<f64>) -> f64 {
-        let (from_centre, radius) = self.nearest_ball(p);
-        from_centre.norm() - radius
-    }
-
-    /// Of the ball that decides the distance of `p`: the way from its centre to `p`, along which the distance grows, and
-    /// its radius, mm.
-    pub(super) fn nearest_ball(&self, p: &Point3<f64>) -> (Vector3<f64>, f64) {
-        let from_start = p - self.start;
-        if self.length == 0.0 {
-            return (from_start, self.radius);
-        }
-        let along = from_start.dot(&self.axis);
-        let away = (from_start - self.axis * along).norm();
-        let s = (along + self.lean * away).clamp(0.0, self.length);
-        (from_start - self.axis * s, self.radius + self.slope * s)
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    impl Distance {
+        /// Signed distance from `p` to the surface, mm: negative inside.
+        pub(in crate::stage::surface) fn at(&self, p: &Point3<f64>) -> f64 {
+            let from_start = p - self.start;
+            let along = from_start.dot(&self.axis);
+            let away = (from_start - self.axis * along).norm();
+            let s = (along + self.lean * away).clamp(0.0, self.length);
+            (from_start - self.axis * s).norm() - (self.radius + self.slope * s)
+        }
+    }
 
     fn cone(x: f64, radii: [f64; 2]) -> Distance {
         Distance::to(&RoundCone { centres: [Point3::origin(), Point3::new(x, 0.0, 0.0)], radii })
@@ -95,7 +87,6 @@ mod tests {
             [(cone(1.0, [5.0, 2.0]), 0.0), (cone(1.0, [2.0, 5.0]), 1.0), (cone(3.0, [5.0, 2.0]), 0.0)]
         {
             assert_eq!(swallowed.at(&Point3::new(centre, 0.0, 7.0)), 2.0);
-            assert_eq!(swallowed.nearest_ball(&Point3::new(centre, 0.0, 7.0)), (7.0 * Vector3::z(), 5.0));
         }
     }
 }

@@ -194,12 +194,6 @@ pub(super) fn seen_ahead(blocks: [u64; 8]) -> [u64; 8] {
     std::array::from_fn(|i| if i < 4 { here[i] } else { on(0, here[i - 4], next[i - 4]) })
 }
 
-/// The lattice point of a cube, in half cubes.
-pub(super) fn point_of(block_corner: [i32; 3], bit: usize, kind: usize) -> [i32; 3] {
-    let cube = cube_of(bit);
-    [0, 1, 2].map(|axis| block_corner[axis] + (2 * cube[axis] + kind) as i32)
-}
-
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
@@ -210,6 +204,12 @@ pub(super) mod tests {
         let block = moved.iter().fold(0, |block, along| 2 * block + along / 4);
         let there = (0..64).find(|&there| cube_of(there) == moved.map(|along| along % 4));
         (block, there.expect("a cube of the block"))
+    }
+
+    /// The lattice point of a cube, in half cubes.
+    pub(in crate::stage::surface) fn point_of(block_corner: [i32; 3], bit: usize, kind: usize) -> [i32; 3] {
+        let cube = cube_of(bit);
+        [0, 1, 2].map(|axis| block_corner[axis] + (2 * cube[axis] + kind) as i32)
     }
 
     /// A corner's place in half cubes, of the cube at the origin.

@@ -16,8 +16,8 @@ use super::{
     crossing::{PutVertices, Sorted},
     distance::Distance,
     lattice::{Lattice, SIDE},
-    near::{FillNumbers, Numbers, Points},
-    patch::{Blocks, Count, Cut, Place, PutFaces},
+    near::Points,
+    patch::{Blocks, Count, Cut, Place, PutFaces, Workshop},
     prune::{Answer, prune},
     region::{Level, Octant, Region, Solid},
 };
@@ -151,7 +151,7 @@ impl Seeds {
 fn number(cuts: &mut [Vec<Cut>]) -> u32 {
     let (mut vertices, mut faces) = (0, 0);
     for cut in cuts.iter_mut().flatten() {
-        cut.first_vertex = vertices;
+        cut.number_from(vertices);
         vertices += cut.vertices;
         faces += cut.faces;
     }
@@ -170,6 +170,9 @@ impl<'a> Wood<'a> {
     fn ahead(&self, grove: usize, place: usize) -> [Option<Place>; 8] {
         let corner = self.groves[grove].blocks[place].corner;
         std::array::from_fn(|ahead| {
+            if ahead == 0 {
+                return Some((grove as u32, place as u32));
+            }
             let step = |axis: usize| (ahead >> (2 - axis) & 1) as i32 * 2 * SIDE;
             self.places.get(&name([0, 1, 2].map(|axis| corner[axis] + step(axis)))).copied()
         })
@@ -186,9 +189,9 @@ impl<'a> Wood<'a> {
     fn put(&self, solid: &Solid, cuts: &[Vec<Cut>], mesh: &mut Mesh) {
         let count = |of: fn(&Cut) -> u32| cuts.iter().flatten().map(|cut| of(cut) as usize).sum();
         mesh.vertices.resize(count(|cut| cut.vertices), Point3::origin());
-        spread(0, cuts, &mut mesh.vertices, |cut| cut.vertices, &|grove, mut vertices| {
+        spread(cuts, &mut mesh.vertices, |cut| cut.vertices, &|cuts, mut vertices| {
             let (mut points, mut sorted) = (Points::default(), Sorted::default());
-            for cut in cuts[grove].iter().filter(|cut| cut.vertices > 0) {
+            for cut in cuts.iter().flatten().filter(|cut| cut.vertices > 0) {
                 let (own, others) = vertices.split_at_mut(cut.vertices as usize);
                 let blocks = self.blocks(&cut.ahead);
                 points.fill(&blocks);
@@ -198,38 +201,32 @@ impl<'a> Wood<'a> {
             }
         });
         mesh.faces.resize(count(|cut| cut.faces), [0; 3]);
-        let vertices = &mesh.vertices;
-        spread(0, cuts, &mut mesh.faces, |cut| cut.faces, &|grove, mut faces| {
-            let mut numbers = Numbers::default();
-            for cut in cuts[grove].iter().filter(|cut| cut.faces > 0) {
+        let (all, vertices) = (cuts, &mesh.vertices);
+        spread(cuts, &mut mesh.faces, |cut| cut.faces, &|cuts, mut faces| {
+            let mut room = Workshop::default();
+            for cut in cuts.iter().flatten().filter(|cut| cut.faces > 0) {
                 let (own, others) = faces.split_at_mut(cut.faces as usize);
-                let ahead = cut.ahead.map(|place| Some(&cuts[place?.0 as usize][place?.1 as usize]));
-                widest(FillNumbers { cuts: &ahead, numbers: &mut numbers });
-                let blocks = self.blocks(&cut.ahead);
-                widest(PutFaces { blocks: &blocks, numbers: &numbers, vertices, faces: own });
+                let seen = cut.ahead.map(|place| Some(&all[place?.0 as usize][place?.1 as usize]));
+                widest(PutFaces { cuts: &seen, vertices, room: &mut room, faces: own });
                 faces = others;
             }
         });
     }
 }
 
-/// Hands to `put`, side by side, the number of each grove and its share of `out`.
+/// Hands to `put`, side by side, some groves at a time with their share of `out`.
 fn spread<T: Send>(
-    first: usize,
     cuts: &[Vec<Cut>],
     out: &mut [T],
     count: fn(&Cut) -> u32,
-    put: &(impl Fn(usize, &mut [T]) + Sync),
+    put: &(impl Fn(&[Vec<Cut>], &mut [T]) + Sync),
 ) {
-    if let [_] = cuts {
-        return put(first, out);
+    if cuts.len() <= (GROVES / rayon::current_num_threads()).max(1) {
+        return put(cuts, out);
     }
     let (left, right) = cuts.split_at(cuts.len() / 2);
     let (here, there) = out.split_at_mut(left.iter().flatten().map(|cut| count(cut) as usize).sum());
-    rayon::join(
-        || spread(first, left, here, count, put),
-        || spread(first + left.len(), right, there, count, put),
-    );
+    rayon::join(|| spread(left, here, count, put), || spread(right, there, count, put));
 }
 
 /// The corner of a block as one number: on each axis it is far below 2^21.

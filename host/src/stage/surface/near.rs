@@ -1,12 +1,12 @@
 //! What a block's cubes see: the block's own cubes and those ahead of it, five along each axis.
 
 use super::{
-    block::bits,
+    block::{bits, fours},
     lattice::{Corner, EDGES, Edge, SIDE, TETRAHEDRA, cube_of},
     patch::{Blocks, Cut},
     vectors::{Vectors, load},
 };
-use crate::lanes::{Floats, LANES, Work};
+use crate::lanes::{Floats, LANES};
 
 /// Cubes that a block sees.
 const CUBES: usize = 5 * 5 * 5;
@@ -14,9 +14,9 @@ const CUBES: usize = 5 * 5 * 5;
 /// The way to the cube ahead, a bit an axis as in [`Corner`](super::lattice::Corner).
 pub(super) const AHEAD: [usize; 8] = [0, 1, 5, 6, 25, 26, 30, 31];
 
-/// The place of each cube of a block.
-pub(super) const PLACES: [usize; 64] = {
-    let mut places = [0; 64];
+/// The place of each cube of a block, and one for what is none.
+pub(super) const PLACES: [usize; 65] = {
+    let mut places = [0; 65];
     let mut bit = 0;
     while bit < 64 {
         let [x, y, z] = cube_of(bit);
@@ -40,14 +40,28 @@ const SEEN: [u64; 8] = {
     seen
 };
 
-/// The blocks ahead, a bit each, of which the tetrahedra of a block have edges in each direction.
-const NEEDED: [u8; EDGES] = {
-    let mut needed = [0; EDGES];
+/// The place of each cube that is seen of each block ahead, and one beyond all for what is none.
+const SEEN_PLACES: [[u8; 65]; 8] = {
+    let mut places = [[CUBES as u8; 65]; 8];
+    let mut i = 0;
+    while i < 8 * 64 {
+        let (ahead, bit) = (i / 64, i % 64);
+        if SEEN[ahead] >> bit & 1 == 1 {
+            places[ahead][bit] = (PLACES[bit] + 4 * AHEAD[ahead]) as u8;
+        }
+        i += 1;
+    }
+    places
+};
+
+/// Of each block ahead, a bit each, the directions in which the tetrahedra of a block have edges there.
+const NEEDED: [u64; 8] = {
+    let mut needed = [0; 8];
     let mut i = 0;
     while i < TETRAHEDRA.len() * 16 * 8 {
         let (Edge { direction, ahead }, block) = (TETRAHEDRA[i >> 7].edges[i >> 5 & 3][i >> 3 & 3], i & 7);
         if i >> 5 & 3 != i >> 3 & 3 && ahead & block == block {
-            needed[direction] |= 1 << block;
+            needed[block] |= 1 << direction;
         }
         i += 1;
     }
@@ -134,47 +148,36 @@ const UNMOVED: [[f32; 256]; 3] = {
 
 /// The numbers of the vertices that a block sees, by the direction of their edge and by cube.
 #[derive(Debug)]
-pub(super) struct Numbers([u32; EDGES * CUBES]);
+pub(super) struct Numbers([[u32; CUBES + 1]; EDGES]);
 
 impl Default for Numbers {
     fn default() -> Self {
-        Self([0; EDGES * CUBES])
+        Self([[0; CUBES + 1]; EDGES])
     }
 }
 
 impl Numbers {
     /// Where in a direction the numbers of a cube's edges are, from the cube's own place.
-    pub(super) const fn offset(direction: usize, ahead: usize) -> usize {
-        direction * CUBES + AHEAD[ahead]
+    pub(super) const fn offset(Edge { direction, ahead }: Edge) -> usize {
+        direction * (CUBES + 1) + AHEAD[ahead]
     }
 
     pub(super) fn at(&self, place: usize) -> u32 {
-        self.0[place]
+        self.0.as_flattened()[place]
     }
-}
 
-/// Fills in the numbers of a block's vertices and of those ahead of it; what is on no edge that is cut stays what it
-/// is.
-pub(super) struct FillNumbers<'a> {
-    pub(super) cuts: &'a [Option<&'a Cut>; 8],
-    pub(super) numbers: &'a mut Numbers,
-}
-
-impl Work for FillNumbers<'_> {
-    type Output = ();
-
+    /// Fills in the numbers of a block's vertices and of those ahead of it; what is on no edge that is cut stays what
+    /// it is.
     #[inline(always)]
-    fn run<L: Floats>(self) {
-        for (ahead, cut) in self.cuts.iter().enumerate() {
+    pub(super) fn fill(&mut self, cuts: &[Option<&Cut>; 8]) {
+        for (ahead, cut) in cuts.iter().enumerate() {
             let Some(cut) = cut else { continue };
-            for (direction, numbers) in self.numbers.0.chunks_exact_mut(CUBES).enumerate() {
-                if NEEDED[direction] >> ahead & 1 == 0 {
-                    continue;
-                }
-                let (edges, first) = cut.numbered(direction);
-                for bit in bits(edges & SEEN[ahead]) {
-                    let before = (edges & ((1 << bit) - 1)).count_ones();
-                    numbers[PLACES[bit] + 4 * AHEAD[ahead]] = first + before;
+            for direction in bits(NEEDED[ahead]) {
+                let (edges, numbers) = (&cut.edges[direction], &mut self.0[direction]);
+                for four in fours(edges.cubes & SEEN[ahead]) {
+                    for bit in four {
+                        numbers[usize::from(SEEN_PLACES[ahead][bit])] = edges.number(bit);
+                    }
                 }
             }
         }

@@ -9,7 +9,7 @@ use nalgebra::Point3;
 
 use super::{
     block::{Block, Grove, bits},
-    lattice::{Corner, EDGES, ENDS, Edge, TETRAHEDRA, Tetrahedron, seen_ahead},
+    lattice::{Corner, EDGES, ENDS, TETRAHEDRA, Tetrahedron, seen_ahead},
     near::{Numbers, PLACES},
 };
 use crate::lanes::{Floats, Work};
@@ -38,26 +38,48 @@ const FEWER_FIRST: [[usize; 4]; 16] = [
 /// Where a block is: its grove, and its place there.
 pub(super) type Place = (u32, u32);
 
-/// The edges of a block that the surface cuts.
+/// The edges of a block in one direction that the surface cuts.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Edges {
+    /// The cubes of which it is cut.
+    pub(super) cubes: u64,
+    /// The number of the first one's vertex.
+    first: u32,
+}
+
+impl Edges {
+    /// The number of the vertex of a cube's edge, which is cut; any number of what is no cube.
+    #[inline(always)]
+    pub(super) fn number(&self, bit: usize) -> u32 {
+        self.first + (self.cubes & ((1 << (bit % 64)) - 1)).count_ones()
+    }
+}
+
+/// What of a block the surface cuts.
 #[derive(Debug)]
 pub(super) struct Cut {
-    /// The cubes of which the edge in each direction is cut.
-    pub(super) edges: [u64; EDGES],
-    /// The number of the first vertex in each direction, from the block's first.
-    first: [u16; EDGES],
-    /// The number of the block's first vertex.
-    pub(super) first_vertex: u32,
+    /// By direction.
+    pub(super) edges: [Edges; EDGES],
     pub(super) vertices: u32,
     pub(super) faces: u32,
+    /// The points that are inside, as the block's cubes see them: by kind, then by cube ahead.
+    inside: [[u64; 8]; 2],
     /// The block and those ahead of it, see [`Blocks`].
     pub(super) ahead: [Option<Place>; 8],
+}
+
+impl Cut {
+    /// Numbers the vertices, of which the first is now 0.
+    pub(super) fn number_from(&mut self, first: u32) {
+        self.edges.iter_mut().for_each(|edges| edges.first += first);
+    }
 }
 
 /// A block and the seven ahead of it, where there are any. What is missing is further from the surface than
 /// an edge is long, so that an edge that leads there is not cut.
 pub(super) type Blocks<'a> = [Option<(&'a Grove, &'a Block)>; 8];
 
-/// The points of a block that are inside, as its cubes see them: by kind, then by cube ahead.
+/// See [`Cut::inside`].
 #[inline(always)]
 fn inside(blocks: &Blocks) -> [[u64; 8]; 2] {
     let own = blocks[0].expect("a block").1;
@@ -71,7 +93,7 @@ fn inside(blocks: &Blocks) -> [[u64; 8]; 2] {
     [seen_ahead(inside[0]), seen_ahead(inside[1])]
 }
 
-/// What of a block is cut; its first vertex is yet to be numbered.
+/// What of a block is cut; its first vertex is number 0.
 pub(super) struct Count<'a> {
     pub(super) blocks: &'a Blocks<'a>,
     pub(super) ahead: [Option<Place>; 8],
@@ -83,11 +105,10 @@ impl Work for Count<'_> {
     #[inline(always)]
     fn run<L: Floats>(self) -> Cut {
         let inside = inside(self.blocks);
-        let (mut edges, mut first, mut vertices) = ([0; EDGES], [0; EDGES], 0);
-        for (direction, [a, b]) in ENDS.iter().enumerate() {
-            edges[direction] = inside[a.kind][a.ahead] ^ inside[b.kind][b.ahead];
-            first[direction] = vertices as u16;
-            vertices += edges[direction].count_ones();
+        let (mut edges, mut vertices) = ([Edges::default(); EDGES], 0);
+        for (edges, [a, b]) in edges.iter_mut().zip(&ENDS) {
+            *edges = Edges { cubes: inside[a.kind][a.ahead] ^ inside[b.kind][b.ahead], first: vertices };
+            vertices += edges.cubes.count_ones();
         }
         let mut faces = 0;
         if vertices > 0 {
@@ -96,22 +117,30 @@ impl Work for Count<'_> {
                 faces += triangles.count_ones() + 2 * quadrilaterals.count_ones();
             }
         }
-        Cut { edges, first, first_vertex: 0, vertices, faces, ahead: self.ahead }
+        Cut { edges, vertices, faces, inside, ahead: self.ahead }
     }
 }
 
-impl Cut {
-    /// The edges in a direction that are cut, and the number of the first one's vertex.
-    pub(super) fn numbered(&self, direction: usize) -> (u64, u32) {
-        (self.edges[direction], self.first_vertex + u32::from(self.first[direction]))
+/// Room to make faces in.
+#[derive(Debug)]
+pub(super) struct Workshop {
+    numbers: Numbers,
+    /// The corners of quadrilaterals.
+    quadrilaterals: [[u32; 4]; 64 * TETRAHEDRA.len()],
+}
+
+impl Default for Workshop {
+    fn default() -> Self {
+        Self { numbers: Numbers::default(), quadrilaterals: [[0; 4]; 64 * TETRAHEDRA.len()] }
     }
 }
 
-/// Puts a block's faces into `faces`; `numbers` are those of the vertices that it sees.
+/// Puts a block's faces into `faces`: triangles, then halves of quadrilaterals.
 pub(super) struct PutFaces<'a> {
-    pub(super) blocks: &'a Blocks<'a>,
-    pub(super) numbers: &'a Numbers,
+    /// The block and those ahead of it.
+    pub(super) cuts: &'a [Option<&'a Cut>; 8],
     pub(super) vertices: &'a [Point3<f64>],
+    pub(super) room: &'a mut Workshop,
     pub(super) faces: &'a mut [[u32; 3]],
 }
 
@@ -120,30 +149,41 @@ impl Work for PutFaces<'_> {
 
     #[inline(always)]
     fn run<L: Floats>(self) {
-        let inside = inside(self.blocks);
-        let mut faces = self.faces.iter_mut();
-        let mut put = |face| *faces.next().expect("a place for each face") = face;
+        let Workshop { numbers, quadrilaterals } = self.room;
+        numbers.fill(self.cuts);
+        let inside = &self.cuts[0].expect("a block").inside;
+        let (mut triangle, mut quadrilateral) = (0, 0);
         for (tetrahedron, rings) in TETRAHEDRA.iter().zip(&RINGS) {
-            let [a, b, c, d] = corners(tetrahedron, &inside);
-            let ring = |bit: usize| {
+            let [a, b, c, d] = corners(tetrahedron, inside);
+            for bit in bits((a | b | c | d) & !(a & b & c & d)) {
                 let set = (a >> bit & 1) | (b >> bit & 1) << 1 | (c >> bit & 1) << 2 | (d >> bit & 1) << 3;
-                let vertex = |edge: u16| self.numbers.at(PLACES[bit] + usize::from(edge));
-                let [p, q, r, s] = rings[set as usize];
-                [vertex(p), vertex(q), vertex(r), vertex(s)]
-            };
-            let [triangles, quadrilaterals] = cut(tetrahedron, &inside);
-            for bit in bits(triangles) {
-                let [p, q, r, _] = ring(bit);
-                put([p, q, r]);
+                let ring = rings[set as usize].map(|edge| numbers.at(PLACES[bit] + usize::from(edge)));
+                // Without a branch, as nobody could foretell it: what does not count is written over.
+                let [p, q, r, _] = ring;
+                self.faces[triangle] = [p, q, r];
+                quadrilaterals[quadrilateral] = ring;
+                let is_triangle = usize::from(TRIANGLES >> set & 1);
+                triangle += is_triangle;
+                quadrilateral += 1 - is_triangle;
             }
-            for bit in bits(quadrilaterals) {
-                let [p, q, r, s] = from_shorter_diagonal(ring(bit), self.vertices);
-                put([p, q, r]);
-                put([p, r, s]);
-            }
+        }
+        let halves = self.faces[triangle..].as_chunks_mut().0;
+        for (halves, ring) in halves.iter_mut().zip(&quadrilaterals[..quadrilateral]) {
+            let [p, q, r, s] = from_shorter_diagonal(*ring, self.vertices);
+            *halves = [[p, q, r], [p, r, s]];
         }
     }
 }
+
+/// The sets of a tetrahedron's corners that are cut off in a triangle, a bit each.
+const TRIANGLES: u16 = {
+    let (mut sets, mut set) = (0, 0_u16);
+    while set < 16 {
+        sets |= ((set.count_ones() % 2) as u16) << set;
+        set += 1;
+    }
+    sets
+};
 
 /// Of each of a tetrahedron's corners, the cubes whose corner it is that are inside.
 #[inline(always)]
@@ -179,8 +219,8 @@ const RINGS: [[Ring; 16]; TETRAHEDRA.len()] = {
         let mut corner = 0;
         while corner < 4 {
             let [from, to] = pairs[corner];
-            let Edge { direction, ahead } = tetrahedron.edges[FEWER_FIRST[set][from]][FEWER_FIRST[set][to]];
-            rings[i / 16][set][corner] = Numbers::offset(direction, ahead) as u16;
+            let edge = tetrahedron.edges[FEWER_FIRST[set][from]][FEWER_FIRST[set][to]];
+            rings[i / 16][set][corner] = Numbers::offset(edge) as u16;
             corner += 1;
         }
         i += 1;
@@ -192,7 +232,9 @@ const RINGS: [[Ring; 16]; TETRAHEDRA.len()] = {
 #[inline(always)]
 fn from_shorter_diagonal([p, q, r, s]: [u32; 4], vertices: &[Point3<f64>]) -> [u32; 4] {
     let apart = |i: u32, j: u32| (vertices[i as usize] - vertices[j as usize]).norm_squared();
-    if apart(p, r) <= apart(q, s) { [p, q, r, s] } else { [q, r, s, p] }
+    let turn = usize::from(apart(p, r) > apart(q, s));
+    let twice = [p, q, r, s, p];
+    std::array::from_fn(|i| twice[turn + i])
 }
 
 #[cfg(test)]

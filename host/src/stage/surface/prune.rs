@@ -14,9 +14,9 @@
 //!   another closely.
 
 use super::{
-    block::{EDGE, bits},
+    block::EDGE,
     bundle::{Bundle, ROUNDING},
-    cone::Group,
+    cone::{Cone, Group},
     region::Around,
     vectors::{Vectors, all, dot, less, load, plus, store, times},
 };
@@ -112,11 +112,17 @@ impl Work for Prune<'_> {
                 }
             }
         }
+        // Without a branch, as nobody could foretell it.
+        let mut end = kept.len();
+        kept.resize(end + bundle.cones.len(), 0);
         for (cones, answer) in bundle.cones.chunks(LANES).zip(&**answers) {
             let beaten = L::splat(0.0).is_below(L::load(&answer.beaten)).bits();
-            let all = u32::MAX >> (u32::BITS as usize - cones.len());
-            kept.extend(bits(u64::from(!beaten & all)).map(|i| cones[i]));
+            for (i, &cone) in cones.iter().enumerate() {
+                kept[end] = cone;
+                end += (!beaten >> i & 1) as usize;
+            }
         }
+        kept.truncate(end);
         true
     }
 }
@@ -124,7 +130,7 @@ impl Work for Prune<'_> {
 /// What the cones of a group answer about a point.
 #[inline(always)]
 fn ask<L: Floats>(group: &Group, offset: Vectors<L>) -> Answer {
-    let (from_centre, square, radius) = group.balls(offset);
+    let (from_centre, square, radius) = Cone::each(group).balls(offset);
     let far = square.sqrt();
     let scale = L::splat(1.0) / far.max(L::splat(f32::MIN_POSITIVE));
     Answer {

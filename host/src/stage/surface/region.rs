@@ -59,7 +59,7 @@ impl Level {
         let middle = solid.middle(region);
         self.groups.clear();
         prepare(&self.cones, solid.distances, &middle, solid.lattice.cube, &mut self.groups);
-        Bundle { cones: &self.cones, groups: &self.groups, middle }
+        Bundle { cones: &self.cones, groups: &self.groups }
     }
 }
 
@@ -90,7 +90,7 @@ impl Octant {
 
     pub(super) fn of(parent: Region, octant: usize) -> Self {
         let region = parent.octant(octant);
-        let margin = if region.cubes == SIDE { CLEAR as f32 } else { EDGE };
+        let margin = if region.cubes == SIDE { CLEAR } else { EDGE };
         let quarter = parent.cubes as f32 / 4.0;
         let offset = [0, 1, 2].map(|axis| if octant >> (2 - axis) & 1 == 1 { quarter } else { -quarter });
         Self { region, around: Around { offset, reach: reach(region.cubes), margin } }

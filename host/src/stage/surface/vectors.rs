@@ -46,3 +46,9 @@ pub(super) fn times<L: Floats>(a: Vectors<L>, times: L) -> Vectors<L> {
 pub(super) fn less<L: Floats>(a: Vectors<L>, b: Vectors<L>, times: L) -> Vectors<L> {
     [a[0] - b[0] * times, a[1] - b[1] * times, a[2] - b[2] * times]
 }
+
+/// The first vector where a mask is set, and the second one elsewhere.
+#[inline(always)]
+pub(super) fn choose<L: Floats>(mask: L, a: Vectors<L>, b: Vectors<L>) -> Vectors<L> {
+    [mask.choose(a[0], b[0]), mask.choose(a[1], b[1]), mask.choose(a[2], b[2])]
+}
