@@ -240,15 +240,16 @@ fn what_is_expected_grows_with_noise_as_the_spread_of_surfaces_does() {
 }
 
 #[test]
-fn the_error_of_an_ellipsoid_is_about_what_is_expected() {
+fn an_ellipsoid_is_off_by_what_is_expected_or_less() {
     let truth = ellipsoid();
     for name in ["matte", "clouds", "checks", "noise 2", "noise 5"] {
         let found = vertices(&made(&look(name).see(&truth), Front::Auto), &truth);
-        let share = shares(&[&found]);
+        let [all, visible] = shares(&[&found]);
         let within = found.iter().filter(|vertex| vertex.error < 2.0 * vertex.expected).count();
         let within = within as f64 / found.len() as f64;
-        println!("{name}: error in the expected {share:.2?}, {:.1} % within twice that", 100.0 * within);
-        assert!(share.iter().all(|share| (0.2..1.25).contains(share)), "{name}: {share:.2?}");
+        println!("{name}: {all:.2} and {visible:.2} of what is expected, {within:.3} within twice that");
+        // Where much was measured of what is far from round, more is expected of the visible side than is wrong.
+        assert!((0.5..1.5).contains(&all) && visible < 1.25, "{name}: {all:.2}, {visible:.2}");
         assert!(within > 0.85, "{name}: {within:.3}");
     }
 }
