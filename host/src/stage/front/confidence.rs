@@ -31,7 +31,7 @@ const SHARED: f64 = 2.0;
 /// What balls are off by before anything was measured, in half thicknesses, and the nodes that it takes to say so.
 const ODD: f64 = 0.3;
 const FIRM: f64 = 20.0;
-/// The error of the slant in that of the depth: bumps are half as wide as the object is thick.
+/// The error of the slant in what balls are off by, in half thicknesses: that changes over half of one.
 const BUMPY: f64 = 2.0;
 
 /// The confidence of the vertices of `mesh`, whose images are `images`, and which lie `behind` the front.
