@@ -1,6 +1,7 @@
 //! The measured front, held against formulas, against the promises of the mesh, and against the cases with known truth
 //! (`oracle/src/cases.rs` says where: without them their test says so and passes).
 
+use host::bvh::Bvh;
 use host::evaluate::{Options as Ruler, evaluate};
 use host::mesh::Mesh;
 use host::reconstruct::{Front, Options, Reconstruction, reconstruct};
@@ -8,7 +9,7 @@ use host::shape::Shape;
 use host::view::Pinhole;
 use nalgebra::{Point3, Vector3};
 use oracle::cases::{cases, folder, name, open};
-use oracle::confidence::{ratios, vertices};
+use oracle::confidence::{ratios, shares, vertices};
 use oracle::looks::Look;
 use oracle::mesh_checker::check;
 use oracle::scene::{Pair, model};
@@ -184,17 +185,84 @@ fn the_visible_side_of_the_cases_is_nearer_to_the_truth() {
     assert!(sums[1] <= sums[0] - 0.14, "{sums:.3?}");
 }
 
+/// The vertices of a model that look at the left eye, but for those near the outline, each with its normal.
+fn inner(mesh: &Mesh) -> Vec<(usize, Vector3<f64>)> {
+    let mut normals = vec![Vector3::zeros(); mesh.vertices.len()];
+    for (face, corners) in mesh.faces.iter().enumerate() {
+        corners.iter().for_each(|&corner| normals[corner as usize] += mesh.area_normal(face));
+    }
+    let inner = |(vertex, point): (usize, &Point3<f64>)| {
+        let across = (point - PLACE).component_div(&AXES).xy().norm();
+        (across < 0.8 && point.z < PLACE.z).then(|| (vertex, normals[vertex].normalize()))
+    };
+    mesh.vertices.iter().enumerate().filter_map(inner).collect()
+}
+
+/// Mean of what the confidence expects of the inner vertices of an ellipsoid's model by grey levels, and the spread of
+/// their surfaces under other noise, mm: along the normal, where rays through the vertices of the first model meet
+/// those of the others.
+fn expected_and_spread(mut look: Look) -> [f64; 2] {
+    let models: Vec<_> = (1..=8)
+        .map(|k| {
+            look.seed = 10 * k;
+            made(&look.see(&ellipsoid()), Front::Grey)
+        })
+        .collect();
+    let others: Vec<_> = models.iter().map(|model| Bvh::new(&model.mesh)).collect();
+    let (mesh, front) = (&models[0].mesh, models[0].front.as_ref().unwrap());
+    let all = inner(mesh);
+    let [mut expected, mut spread] = [0.0; 2];
+    for (vertex, normal) in &all {
+        let ray = mesh.vertices[*vertex].coords;
+        let off = |other: &Bvh| {
+            (other.first_hit(&Point3::origin(), &ray).unwrap().parameter - 1.0) * ray.dot(normal)
+        };
+        let off: Vec<f64> = others.iter().map(off).collect();
+        let mean = off.iter().sum::<f64>() / off.len() as f64;
+        spread += (off.iter().map(|o| (o - mean).powi(2)).sum::<f64>() / (off.len() - 1) as f64).sqrt();
+        expected += 1.0 / front.confidence[*vertex] - 1.0;
+    }
+    [expected, spread].map(|sum| sum / all.len() as f64)
+}
+
+#[test]
+fn what_is_expected_grows_with_noise_as_the_spread_of_surfaces_does() {
+    let [weak, strong] = ["noise 2", "noise 5"].map(|name| expected_and_spread(look(name)));
+    println!("expected and spread, mm: {weak:.3?} at noise 2, {strong:.3?} at noise 5");
+    for [expected, spread] in [weak, strong] {
+        assert!((0.2..1.0).contains(&(spread / expected)), "{spread:.3} of {expected:.3} mm");
+    }
+    let [expected, spread] = [0, 1].map(|of| strong[of] / weak[of]);
+    assert!(
+        (expected / spread).ln().abs() < 0.7,
+        "{expected:.2} times, where the spread is {spread:.2} times"
+    );
+}
+
+#[test]
+fn an_ellipsoid_is_off_by_about_what_is_expected_or_less() {
+    let truth = ellipsoid();
+    for name in ["matte", "clouds", "checks", "noise 2"] {
+        let found = vertices(&made(&look(name).see(&truth), Front::Auto), &truth);
+        let [all, visible] = shares(&[&found]);
+        let within = found.iter().filter(|vertex| vertex.error < 2.0 * vertex.expected).count();
+        let within = within as f64 / found.len() as f64;
+        println!("{name}: {all:.2} and {visible:.2} of what is expected, {within:.3} within twice that");
+        // Where much was measured of what is far from round, more is expected of the visible side than is wrong; in
+        // noise, what the gates return to the balls seems rounder than it is.
+        assert!((0.5..2.0).contains(&all) && visible < 2.0, "{name}: {all:.2}, {visible:.2}");
+        assert!(within > 0.65, "{name}: {within:.3}");
+    }
+}
+
 /// Below this error, % of the diagonal, nothing is promised of the confidence.
 const NOISE: f64 = 0.2;
 /// Least error of the least confident fifth of vertices over that of the most confident one.
 const RATIO: f64 = 3.0;
 /// Where it does not tell so much, of all vertices and of the visible ones: what was measured, less a tenth.
-const EXCEPTIONS: [(&str, [f64; 2]); 4] = [
-    ("block", [1.7, RATIO]),
-    ("real_dino1", [RATIO, 1.2]),
-    ("real_viff1", [RATIO, 2.7]),
-    ("screwdriver", [RATIO, 0.7]),
-];
+const EXCEPTIONS: [(&str, [f64; 2]); 2] = [("block", [1.9, RATIO]), ("real_dino1", [RATIO, 1.6])];
+/// Least and most that the mean error may be in the expected one.
+const SHARE: [f64; 2] = [0.4, 2.4];
 
 #[test]
 fn confidence_says_how_far_the_vertices_of_the_cases_are_off() {
@@ -204,14 +272,16 @@ fn confidence_says_how_far_the_vertices_of_the_cases_are_off() {
         let ([left, right], camera) = open(&case);
         let truth = host::mesh::read::read(&case.join("truth.ply")).unwrap();
         let made = reconstruct(left, right, &camera, &with(Front::Auto), &mut ()).unwrap();
+        let found = vertices(&made, &truth);
+        let (told, share) = (ratios(&[&found]), shares(&[&found]));
+        println!("{:12} {told:.2?}, error in the expected {share:.2?}", name(&case));
         if error(&made.mesh, &truth) >= NOISE {
-            let told = ratios(&[&vertices(&made, &truth)]);
-            println!("{:12} {told:.2?}", name(&case));
-            all.push((name(&case), told));
+            all.push((name(&case), told, share));
         }
     }
-    for (name, told) in all {
+    for (name, told, share) in all {
         let least = EXCEPTIONS.iter().find(|(known, _)| *known == name).map_or([RATIO; 2], |known| known.1);
         assert!(told[0] >= least[0] && told[1] >= least[1], "{name}: {told:?} of {least:?}");
+        assert!(share.iter().all(|s| (SHARE[0]..=SHARE[1]).contains(s)), "{name}: {share:?}");
     }
 }

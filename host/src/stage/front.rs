@@ -100,7 +100,7 @@ pub fn measure(pool: &Pool, mesh: &mut Mesh, sight: &Sight<'_>, gated: bool) -> 
         lattice.nodes().filter(|&node| has(node)).count() as f64 / lattice.nodes().count().max(1) as f64
     };
     Measured {
-        confidence: confidence::of_vertices(&field, &images[0], &behind).keep(),
+        confidence: confidence::of_vertices(pool, mesh, (&field, camera), &images[0], &behind).keep(),
         share: share(&|node| field.is_measured(node)),
         distrusted: share(&|node| field.held[node]),
         noise,

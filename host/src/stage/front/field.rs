@@ -56,7 +56,7 @@ pub(super) struct Field<'p> {
     pub(super) lattice: Lattice<'p>,
     /// Displacement of each node.
     pub(super) moved: Lent<'p, f64>,
-    /// What stereo says of each node: the inverse square of its displacement's standard deviation.
+    /// What stereo says of each node, though it be held: the inverse square of its displacement's standard deviation.
     pub(super) known: Lent<'p, f64>,
     /// Nodes at which the ball model is held to.
     pub(super) held: Lent<'p, bool>,
@@ -152,13 +152,15 @@ impl<'p> Field<'p> {
             let seen = look(lattice, &visible, pictures, scene, (&self.moved, &self.response));
             self.response = respond(&scene.pool.numbers, &seen, self.response, scene.rows);
             self.known.fill(0.0);
-            for seen in seen.iter().filter(|seen| seen.counts && !self.held[seen.node]) {
+            for seen in seen.iter().filter(|seen| seen.counts) {
                 let residual = seen.residual(&self.response);
                 let slope = seen.slope(&self.response, lattice.unit[seen.node]);
                 let doubt = 1.0 + (residual / (ROBUST * sigma)).powi(2);
                 let weight = lattice.area() / (sigma * sigma * doubt);
-                system.add(seen.node, weight, residual, slope);
                 self.known[seen.node] = weight * slope * slope;
+                if !self.held[seen.node] {
+                    system.add(seen.node, weight, residual, slope);
+                }
             }
             system.solve(&mut step);
             for node in lattice.nodes() {
@@ -211,7 +213,7 @@ impl<'p> Field<'p> {
 
     /// Whether stereo says more of a node than the ball model does.
     pub(super) fn is_measured(&self, node: usize) -> bool {
-        self.known[node] > prior(&self.lattice, node, WEAK)
+        !self.held[node] && self.known[node] > prior(&self.lattice, node, WEAK)
     }
 }
 
