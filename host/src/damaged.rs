@@ -37,15 +37,15 @@ pub(crate) fn damaged(text: &[u8], random: &mut Random) -> Vec<u8> {
     for _ in 0..=random.bits() % 4 {
         let from = below(bytes.len() + 1, random);
         let to = from + below((bytes.len() - from).min(8) + 1, random);
-        match random.bits() % 6 {
+        match random.bits() % 7 {
             0..=2 => drop(bytes.splice(from..from, PIECES[below(PIECES.len(), random)].iter().copied())),
             3 => drop(bytes.drain(from..to)),
             4 => {
                 let again = bytes[from..to].to_vec();
                 bytes.splice(from..from, again);
             }
-            _ if from < bytes.len() => bytes[from] ^= 1 << (random.bits() % 8),
-            _ => bytes.truncate(below(bytes.len() + 1, random)),
+            5 => bytes.truncate(from),
+            _ => bytes[from..to].iter_mut().take(1).for_each(|byte| *byte ^= 1 << (random.bits() % 8)),
         }
     }
     bytes

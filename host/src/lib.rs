@@ -63,5 +63,5 @@ pub mod baseline;
 pub mod experiment;
 
 // For tests.
-#[cfg(all(test, any(feature = "batch", feature = "fleet")))]
+#[cfg(test)]
 mod damaged;

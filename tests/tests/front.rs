@@ -250,7 +250,10 @@ fn an_ellipsoid_is_off_by_about_what_is_expected_or_less() {
         println!("{name}: {all:.2} and {visible:.2} of what is expected, {within:.3} within twice that");
         // Where much was measured of what is far from round, more is expected of the visible side than is wrong; in
         // noise, what the gates return to the balls seems rounder than it is.
-        assert!((0.5..2.0).contains(&all) && visible < 2.0, "{name}: {all:.2}, {visible:.2}");
+        assert!(
+            (0.5..2.0).contains(&all) && (0.06..2.0).contains(&visible),
+            "{name}: {all:.2}, {visible:.2}"
+        );
         assert!(within > 0.65, "{name}: {within:.3}");
     }
 }

@@ -27,6 +27,13 @@ pub struct Server {
     pub identity: Option<[PathBuf; 2]>,
 }
 
+impl Server {
+    /// Whether nothing is said to it before it has shown a certificate.
+    fn is_certified(&self) -> bool {
+        self.authority.is_some() || self.identity.is_some() || self.url.starts_with("tls://")
+    }
+}
+
 /// Why a queue did not do what it was asked.
 #[derive(Debug, thiserror::Error)]
 pub enum QueueError {
@@ -100,8 +107,10 @@ pub(super) fn connect(server: &Server) -> Result<(Runtime, Context), QueueError>
         for path in server.authority.iter().chain(server.identity.iter().flatten()) {
             File::open(path).map_err(|source| QueueError::File { path: path.clone(), source })?;
         }
+        // Nor is anything said to servers that this one names: they may know no certificates.
+        options = options.require_tls(server.is_certified()).ignore_discovered_servers();
         if let Some(path) = &server.authority {
-            options = options.add_root_certificates(path.clone()).require_tls(true);
+            options = options.add_root_certificates(path.clone());
         }
         if let Some([certificate, key]) = &server.identity {
             options = options.add_client_certificate(certificate.clone(), key.clone());
@@ -130,7 +139,7 @@ fn causes<'a>(error: &'a (dyn Error + 'static)) -> impl Iterator<Item = &'a (dyn
     std::iter::successors(Some(error), |&error| error.source())
 }
 
-/// Whether a certificate ended it, which comes as what was read and is not valid.
+/// Whether it ended over certificates, or over what is none: what was read is not valid then.
 fn is_distrust(error: &(dyn Error + 'static)) -> bool {
     let invalid = |error: &io::Error| error.kind() == ErrorKind::InvalidData;
     causes(error).filter_map(|cause| cause.downcast_ref()).any(invalid)

@@ -101,9 +101,9 @@ pub struct SubmitArgs {
     /// Which batch.
     #[command(flatten)]
     pub batch: BatchArgs,
-    /// Seconds without a sign of life after which a worker's pairs go to others, 16 or more
+    /// Seconds without a sign of life after which a worker's pairs go to others, 20 or more
     // A sign of life may be a third of this old when a worker dies, and what it left may be swept ten seconds after.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(16..), default_value_t = 30)]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(20..), default_value_t = 30)]
     pub lost_after: u64,
     /// Options of `host replay` that say how a model is made
     #[arg(last = true, value_name = "OPTIONS")]

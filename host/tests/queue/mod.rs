@@ -221,7 +221,7 @@ impl Batch<'_> {
 
     /// Queues the pairs; who dies is noticed as soon as may be.
     pub(crate) fn submit(&self) -> Value {
-        let more = [["--lost-after", "16", "--"].as_slice(), self.kind.how].concat();
+        let more = [["--lost-after", "20", "--"].as_slice(), self.kind.how].concat();
         said(&words(&self.command("submit", &more)))
     }
 

@@ -206,16 +206,16 @@ impl Worker<'_> {
 
     /// Makes and writes a model.
     fn attempt(&self, bench: &mut Bench, job: &Job, taken: &Taken) -> Result<(), Trouble> {
+        let out = &self.args.out;
+        if taken.tries > 1 {
+            sweep(&out.join(&job.name));
+        }
         if taken.tries > self.args.tries {
             let workers = taken.tries - 1;
             return Err(Trouble::Failed(format!(
                 "each of {workers} workers that took it ended without an answer; make it by `host replay`, and look \
                  whether that needs more memory than they have"
             )));
-        }
-        let out = &self.args.out;
-        if taken.tries > 1 {
-            sweep(&out.join(&job.name));
         }
         let recipe = recipe(&mut bench.recipe, &job.how, self.folder, out)?;
         let id = job.id(self.folder, &recipe.sum).map_err(Failure::from)?;

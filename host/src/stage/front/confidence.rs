@@ -10,7 +10,7 @@
 //!   round may turn away elsewhere: there as much is open again as balls are off by inside.
 //! * **Across the surface** this is less, by the cosine of the slant, which is itself not known where balls are off; the
 //!   error of the outline comes on top.
-//! * **Cost**: a few passes over nodes, faces and vertices.
+//! * **Cost**: a few passes over nodes, faces and vertices; sums around a node read 30 others.
 
 use super::field::Field;
 use super::lattice::RIM;
@@ -56,6 +56,7 @@ pub(super) fn of_vertices<'p>(
         // 7 % are left deep inside: stereo is drawn towards the balls a little everywhere.
         let outline = half[node] / nodes[node] * libm::exp(-lattice.rim[node] / RIM);
         let both = disparity * disparity + odd[node] * outline * outline;
+        // Thin as the object is at the rim, unlike the displacements' own unit: there the outline's part counts.
         let balls = odd[node] * lattice.half[node].powi(2);
         let mm = lattice.unit[node] * lattice.depth[node];
         front[node] = both + 1.0 / (1.0 / balls + SHARED * known[node] / (mm * mm));
@@ -72,7 +73,7 @@ pub(super) fn of_vertices<'p>(
         let [front, back, odd] = squares.map(at);
         let along = front * (1.0 - behind[vertex]) + back * behind[vertex];
         let outline = OUTLINE * mesh.vertices[vertex].z / camera.f;
-        let square = outline * outline + along * (facing[vertex] + (BUMPY * BUMPY * odd).min(1.0));
+        let square = outline * outline + along * (facing[vertex] + BUMPY * BUMPY * odd).min(1.0);
         1.0 / (1.0 + square.sqrt())
     };
     pool.numbers.of((0..images.len()).map(confidence))

@@ -239,6 +239,17 @@ pub(super) mod tests {
     }
 
     #[test]
+    fn fours_are_the_ones_and_what_is_none() {
+        for word in [0, 1, 0b1011, 0b1111 << 60, 0x8000_1001_0010_0001, 0x1_F000, u64::MAX] {
+            let fours: Vec<usize> = fours(word).flatten().collect();
+            let ones: Vec<usize> = bits(word).collect();
+            assert_eq!(fours.len(), ones.len().next_multiple_of(4));
+            assert_eq!(fours[..ones.len()], ones);
+            assert!(fours[ones.len()..].iter().all(|&bit| bit == 64));
+        }
+    }
+
+    #[test]
     fn questions_follow_the_surface_and_not_the_volume_nor_the_cones() {
         // A bent limb of 50 mm across as ever more cones.
         let limb = |count: i32| -> Vec<RoundCone> {

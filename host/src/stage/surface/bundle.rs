@@ -281,6 +281,7 @@ mod tests {
     fn all_lanes_say_the_same_about_leaves_and_points() {
         let distances: Vec<Distance> = cones().iter().map(Distance::to).collect();
         let cones: Vec<u32> = (0..distances.len() as u32).collect();
+        let mut seen = [0; 3];
         for cube in [0.5, 0.7, 3.0] {
             let (mut groups, middle) = (Vec::new(), Point3::new(8.0, 7.0, 6.0));
             prepare(&cones, &distances, &middle, cube, &mut groups);
@@ -310,8 +311,14 @@ mod tests {
                 (inside, moved, doubtful, vectors, distances.map(|all| all.map(f32::to_bits)))
             };
             for leaf in 0..8 {
-                assert_eq!(ask(leaf, true), ask(leaf, false), "{cube} {leaf}");
+                let told = ask(leaf, true);
+                assert_eq!(told, ask(leaf, false), "{cube} {leaf}");
+                seen = std::array::from_fn(|k| seen[k] | [told.0, told.1, told.2][k]);
             }
         }
+        assert!(
+            seen.iter().all(|&points| points != 0),
+            "some are inside, some moved, some doubtful: {seen:x?}"
+        );
     }
 }

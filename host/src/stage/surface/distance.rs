@@ -1,4 +1,4 @@
-//! The exact signed distance to a round cone.
+//! Round cones made ready in double precision for the exact signed distance to them (`cone.rs`).
 //!
 //! A round cone is the union of the balls between its ends, so its signed distance is the least over
 //! s in [0, length] of |p - c(s)| - r(s), both outside and, since the hull is convex and smooth, inside.
@@ -13,7 +13,7 @@ use super::RoundCone;
 /// loses less than 1e-8 of the length, and the lean below stays under 10^4, which bounds its rounding.
 const CONTAINED: f64 = 1.0 - 1e-8;
 
-/// A round cone made ready for many distance queries.
+/// A round cone made ready for many questions.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Distance {
     pub(super) start: Point3<f64>,

@@ -214,14 +214,15 @@ impl<'a> Wood<'a> {
     }
 }
 
-/// Hands to `put`, side by side, some groves at a time with their share of `out`.
+/// Hands to `put`, side by side, some groves at a time with their share of `out`: few calls, but some for each thread,
+/// as groves are not equally full.
 fn spread<T: Send>(
     cuts: &[Vec<Cut>],
     out: &mut [T],
     count: fn(&Cut) -> u32,
     put: &(impl Fn(&[Vec<Cut>], &mut [T]) + Sync),
 ) {
-    if cuts.len() <= (GROVES / rayon::current_num_threads()).max(1) {
+    if cuts.len() <= (GROVES / (4 * rayon::current_num_threads())).max(1) {
         return put(cuts, out);
     }
     let (left, right) = cuts.split_at(cuts.len() / 2);

@@ -194,7 +194,8 @@ mod tests {
         for (ahead, bit) in (0..8).flat_map(|ahead| (0..64).map(move |bit| (ahead, bit))) {
             let (block, there) = cube_ahead(bit, ahead);
             let place = PLACES[bit] + AHEAD[ahead];
-            assert_eq!(place, PLACES[there] + 4 * AHEAD[block]);
+            assert_eq!(place, usize::from(SEEN_PLACES[block][there]));
+            assert_eq!(usize::from(SEEN_PLACES[block][64]), CUBES, "what is none has its own");
             assert_eq!(SEEN[block] >> there & 1, 1);
         }
         let seen: u32 = SEEN.iter().map(|cubes| cubes.count_ones()).sum();
