@@ -20,13 +20,13 @@ struct Args {
     #[arg(long, value_delimiter = ',', default_value = "2,8,16,32,80,800")]
     threads: Vec<u64>,
     /// Mean time of a pair on one thread, ms.
-    #[arg(long, default_value_t = 29.0)]
+    #[arg(long, default_value_t = 20.0)]
     pair_ms: f64,
     /// Its deviation, as a share of the mean.
     #[arg(long, default_value_t = 0.5)]
     spread: f64,
     /// The server's time for a pair, us.
-    #[arg(long, default_value_t = 930.0)]
+    #[arg(long, default_value_t = 1020.0)]
     server_us: f64,
     /// Hours between failures of one thread.
     #[arg(long, default_value_t = 100.0)]

@@ -239,14 +239,22 @@ fn panel<DB: DrawingBackend>(
         least.max(1e-3) * 0.8..points().map(of).fold(0.0, f64::max) * 1.25
     };
     /// Room for the legend at the right, as a factor of x.
-    const LEGEND: f64 = 5.0;
+    const LEGEND: f64 = 14.0;
     let x = range(|p| p.0);
     let mut chart = ChartBuilder::on(area)
         .margin(12)
         .x_label_area_size(44)
         .y_label_area_size(64)
         .build_cartesian_2d((x.start..x.end * LEGEND).log_scale(), range(|p| p.1).log_scale())?;
-    chart.configure_mesh().x_desc(curves.along).y_desc("ms").light_line_style(WHITE).draw()?;
+    chart
+        .configure_mesh()
+        .x_desc(curves.along)
+        .y_desc("ms")
+        .x_labels(4)
+        .x_label_formatter(&|x| x.to_string())
+        .y_label_formatter(&|y| y.to_string())
+        .light_line_style(WHITE)
+        .draw()?;
     for (k, (stage, points)) in stages().enumerate() {
         let colour = Palette99::pick(k).to_rgba();
         let label = format!("{stage} {:.2}", exponent(points));
