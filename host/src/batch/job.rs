@@ -166,18 +166,14 @@ mod tests {
         let (sound, mut random) = (job().to_bytes().unwrap(), Random::new(1));
         let mut read = 0;
         for _ in 0..20_000 {
-            match Job::from_bytes(&damaged(&sound, &mut random)) {
-                Err(_) => {}
-                Ok(job) => {
-                    let paths = job.files.iter().chain(&job.calibration).filter_map(|path| path.to_str());
-                    for path in paths.chain([job.name.as_str()]) {
-                        assert!(!path.starts_with('/') && path.split('/').all(|part| part != ".."), "{path}");
-                    }
-                    assert!(matches!(job.files.len(), 1 | 2));
-                    assert_eq!(Job::from_bytes(&job.to_bytes().unwrap()).unwrap(), job);
-                    read += 1;
-                }
+            let Ok(job) = Job::from_bytes(&damaged(&sound, &mut random)) else { continue };
+            let paths = job.files.iter().chain(&job.calibration).filter_map(|path| path.to_str());
+            for path in paths.chain([job.name.as_str()]) {
+                assert!(!path.starts_with('/') && path.split('/').all(|part| part != ".."), "{path}");
             }
+            assert!(matches!(job.files.len(), 1 | 2));
+            assert_eq!(Job::from_bytes(&job.to_bytes().unwrap()).unwrap(), job);
+            read += 1;
         }
         assert!((1000..19_000).contains(&read), "{read} of 20000 are still pairs");
     }
