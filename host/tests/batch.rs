@@ -117,9 +117,11 @@ fn a_queue_across_machines_lets_in_who_is_known_and_nobody_else() {
         assert!(told.contains("do not trust each other"), "{who}: {told}");
         assert!(!told.contains(PASSWORD) && !told.contains("one%40two"), "{who}: {told}");
     }
-    let server = reach(&known, &[&["--ca".into(), file(&ours, "none.pem")]]);
-    let told = Batch { server: &server, ..batch }.try_status().unwrap_err();
-    assert!(told.contains("cannot use") && told.contains("none.pem"), "{told}");
+    for (name, why) in [("none.pem", "none.pem"), ("board-key.pem", "no certificate in PEM")] {
+        let server = reach(&known, &[&["--ca".into(), file(&ours, name)]]);
+        let told = Batch { server: &server, ..batch }.try_status().unwrap_err();
+        assert!(told.contains("cannot use") && told.contains(why), "{told}");
+    }
     assert_eq!(batch.status()["made"], 2, "nobody was disturbed");
     // Whoever knows an authority says nothing in the clear, whatever the server asks for.
     let open = Server::start();

@@ -1,9 +1,9 @@
 //! The server that a queue is on: how it is reached, and what it may not do.
 
 use std::error::Error;
-use std::fs::File;
+use std::fs;
 use std::io::{self, ErrorKind};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use async_nats::jetstream::{self, Context};
@@ -32,11 +32,25 @@ impl Server {
     fn is_certified(&self) -> bool {
         self.authority.is_some() || self.identity.is_some() || self.url.starts_with("tls://")
     }
+
+    /// The files that certify it and us, each with what it must hold.
+    fn pem_files(&self) -> impl Iterator<Item = (&PathBuf, &'static str)> {
+        let ours = self.identity.iter().flatten().zip(["CERTIFICATE", "PRIVATE KEY"]);
+        self.authority.iter().map(|path| (path, "CERTIFICATE")).chain(ours)
+    }
 }
 
 /// Why a queue did not do what it was asked.
 #[derive(Debug, thiserror::Error)]
 pub enum QueueError {
+    /// Nothing can be at such an address.
+    #[error("--server {url} is no address: give one like nats://HOST:4222, or tls://USER:PASSWORD@HOST:4222")]
+    Address {
+        /// What was given, without a password.
+        url: String,
+        /// What the client said.
+        source: async_nats::Error,
+    },
     /// Nobody answers.
     #[error(
         "there is no NATS server at {url}: start one with `nats-server -js -sd FOLDER` (Debian: apt-get install \
@@ -104,8 +118,8 @@ pub(super) fn connect(server: &Server) -> Result<(Runtime, Context), QueueError>
             let read = options.credentials_file(path).await;
             options = read.map_err(|source| QueueError::File { path: path.clone(), source })?;
         }
-        for path in server.authority.iter().chain(server.identity.iter().flatten()) {
-            File::open(path).map_err(|source| QueueError::File { path: path.clone(), source })?;
+        for (path, what) in server.pem_files() {
+            holds_pem(path, what).map_err(|source| QueueError::File { path: path.clone(), source })?;
         }
         // Nor is anything said to servers that this one names: they may know no certificates.
         options = options.require_tls(server.is_certified()).ignore_discovered_servers();
@@ -125,6 +139,7 @@ pub(super) fn connect(server: &Server) -> Result<(Runtime, Context), QueueError>
             | ConnectErrorKind::AuthorizationViolation
             | ConnectErrorKind::Tls => QueueError::Stranger { url, source: error.into() },
             ConnectErrorKind::Io if is_distrust(&error) => QueueError::Stranger { url, source: error.into() },
+            ConnectErrorKind::ServerParse => QueueError::Address { url, source: error.into() },
             _ => QueueError::NoServer { url, source: error.into() },
         })?;
         let mut context = jetstream::new(client);
@@ -132,6 +147,14 @@ pub(super) fn connect(server: &Server) -> Result<(Runtime, Context), QueueError>
         Ok(context)
     });
     Ok((runtime, context?))
+}
+
+/// Whether a file holds what the client, which only says that it is not trusted, will look for there.
+fn holds_pem(path: &Path, what: &str) -> io::Result<()> {
+    if String::from_utf8_lossy(&fs::read(path)?).contains(&format!("{what}-----")) {
+        return Ok(());
+    }
+    Err(io::Error::new(ErrorKind::InvalidData, format!("it holds no {} in PEM", what.to_lowercase())))
 }
 
 /// An error, and what it came of.
@@ -178,6 +201,15 @@ mod tests {
         let said = user_of("tls://one%40lab:two%20words@there:4222").unwrap();
         assert_eq!(said, ["one@lab", "two words"]);
         assert_eq!(user_of("nats://there:4222"), None);
+    }
+
+    #[test]
+    fn what_is_no_address_is_told_as_one() {
+        let url = "nats://me:secret@there:port".to_string();
+        let said =
+            connect(&Server { url, credentials: None, authority: None, identity: None }).err().unwrap();
+        assert!(matches!(&said, QueueError::Address { .. }), "{said:?}");
+        assert!(said.to_string().starts_with("--server nats://there:port is no address"), "{said}");
     }
 
     #[test]
