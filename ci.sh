@@ -2,9 +2,9 @@
 # The one list of checks.
 #
 #   ./ci.sh            everything
-#   ./ci.sh NAME...    single parts: fmt lint test bench doc firmware v4l2 fuzz; qemu, which test contains;
-#                      supply, which installs tools for minutes, and fleet, which builds the optional features:
-#                      both are run where changes are merged; and miri, which is run by hand
+#   ./ci.sh NAME...    single parts: fmt lint test bench doc firmware v4l2 fuzz miri; qemu, which test contains;
+#                      supply, which installs tools for minutes, fleet, which builds the optional features, and
+#                      miri_whole: these three are run where changes are merged
 #
 # Installs what a fresh Debian machine with rustup lacks. The last line is "N passed, N failed", counting
 # tests, and one for each check that is not made of tests. A part that ran no test fails. Exit codes: 0 all
@@ -12,7 +12,7 @@
 set -uo pipefail
 cd "$(dirname "$0")" || exit 1
 
-PARTS=(fmt lint test bench doc firmware v4l2 fuzz)
+PARTS=(fmt lint test bench doc firmware v4l2 fuzz miri)
 TARGET=thumbv7em-none-eabihf
 CASES=../shared/eval
 
@@ -198,12 +198,17 @@ part_fuzz() {
 }
 
 # Undefined behaviour, looked for by an interpreter in the core's tests, with words of 32 bits: elsewhere libm's square
-# root is assembly, which it cannot read. It takes minutes, and a nightly compiler, so it is nobody's default.
-part_miri() {
+# root is assembly, which it cannot read.
+interpreted() {
     toolchain "cargo +nightly miri --version" "install Rust with rustup (https://rustup.rs), which has Miri" \
         toolchain install nightly --component miri,rust-src
-    tests cargo +nightly miri test --locked -p shared --lib --target armv7-unknown-linux-gnueabihf
+    tests cargo +nightly miri test --locked -p shared --lib --target armv7-unknown-linux-gnueabihf -- "$@"
 }
+
+# Without the tests that an interpreter takes longest for.
+part_miri() { interpreted --skip a_disc_is_found --skip masks_of_every_width --skip logarithm_of_powers; }
+
+part_miri_whole() { interpreted; }
 
 # A Python with Zenoh, as a foreign client.
 foreign_client() {
@@ -248,7 +253,7 @@ part_supply() {
     done
     cargo fetch -q --locked
     check cargo deny --offline --locked check licenses bans sources
-    check cargo cyclonedx -q --format json --spec-version 1.5 --target all
+    check cargo cyclonedx -q --format json --spec-version 1.5 --target all --all-features
 }
 
 parts=("$@")

@@ -154,7 +154,7 @@ impl fmt::Write for Sum {
     }
 }
 
-/// A run the way a device goes it: the left picture, its skeleton, the right picture, the pair.
+/// A run with room for one picture, and none for the right eye's skeleton.
 ///
 /// # Errors
 /// What the core refuses.

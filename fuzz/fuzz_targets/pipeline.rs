@@ -5,9 +5,10 @@
 use arbitrary::Arbitrary;
 use fuzz::figure::{Figure, draw};
 use host::memory::Storage;
+use host::source::serial::inbox::{Inbox, Message, Pair};
 use libfuzzer_sys::fuzz_target;
 use oracle::core::hangs_together;
-use oracle::wire::{Lists, check};
+use oracle::wire::check;
 use shared::bitmap::{Grey, Size, WORD_BITS};
 use shared::fixed::PX;
 use shared::pipeline::{self, Finding, Kernels, Memory, Settings};
@@ -71,17 +72,17 @@ impl Choice {
     }
 }
 
-/// Memories as earlier runs left them, lists for a shape that came over the wire, and room for its frame.
+/// Memories as earlier runs left them, where a shape arrives that came over the wire, and room for its frame.
 struct Desk {
     memories: [Storage; 2],
-    lists: Lists,
+    inbox: Inbox,
     frame: Vec<u8>,
 }
 
 thread_local! {
     static DESK: RefCell<Desk> = RefCell::new(Desk {
         memories: Default::default(),
-        lists: Lists::default(),
+        inbox: Inbox::new().expect("memory for shapes"),
         frame: vec![0; 1 << 20],
     });
 }
@@ -96,7 +97,7 @@ fuzz_target!(|case: Case| {
     let right = moved(&left, width, case.shift.into(), case.right_only.as_ref());
     let settings = case.choice.settings();
     DESK.with_borrow_mut(|desk| {
-        let Desk { memories: [first, second], lists, frame } = desk;
+        let Desk { memories: [first, second], inbox, frame } = desk;
         let run = |storage: &mut Storage, portable: bool| {
             storage.fit(width, height).expect("a small picture");
             let grey =
@@ -118,7 +119,7 @@ fuzz_target!(|case: Case| {
         let (one, other) = (first.lend(), second.lend());
         agree(&one, &other);
         if case.choice.paper.is_none() || case.choice.device {
-            survive(Shape::of(&one, &outcome), lists, frame);
+            survive(Shape::of(&one, &outcome), inbox, frame);
         }
     });
 });
@@ -147,7 +148,7 @@ fn agree(one: &Memory<'_>, other: &Memory<'_>) {
 }
 
 /// Write a shape and read it back.
-fn survive(shape: Shape<'_>, lists: &mut Lists, frame: &mut [u8]) {
+fn survive(shape: Shape<'_>, inbox: &mut Inbox, frame: &mut [u8]) {
     let report = PairReport {
         number: 1,
         stamps: [0; 2],
@@ -158,11 +159,12 @@ fn survive(shape: Shape<'_>, lists: &mut Lists, frame: &mut [u8]) {
     let len = ToHost::Pair(report).encode(1, frame).expect("room for the shape of a small picture");
     let (kind, sequence, payload) = oracle::link::frames(&frame[..len]).pop().expect("a frame");
     let frame = Frame { kind, sequence, repeated: false, payload: &payload };
-    match ToHost::decode(&frame, &mut lists.lend()) {
-        Ok(ToHost::Pair(PairReport { result: Ok(read), .. })) => {
-            assert_eq!(read.contour.len(), shape.contour.len());
-            check(read);
-        }
-        other => panic!("a shape came back as {:?}", other.err()),
-    }
+    let read = inbox.read(&frame).expect("a host has room for every shape");
+    let Message::Pair(Pair { result: Ok(outcome), .. }) = read else {
+        panic!("a shape came back as {read:?}")
+    };
+    let memory = inbox.memory();
+    let read = Shape::of(&memory, &outcome);
+    assert_eq!(read.contour.len(), shape.contour.len());
+    check(read);
 }

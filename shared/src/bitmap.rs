@@ -284,7 +284,8 @@ impl<'a> Bitmap<'a> {
         v * self.row_words * WORD_BITS + u
     }
 
-    /// Clear the pixel at a [`place`](Self::place) if its neighbours are such; whether it was. Outside there is none.
+    /// Clear the pixel at a [`place`](Self::place) if `decide` says so of its neighbours, which outside the image are
+    /// clear; what it said.
     #[inline]
     pub fn clear_if(&mut self, place: usize, decide: impl Fn(u8) -> bool) -> bool {
         let (i, bit) = (place / WORD_BITS, place % WORD_BITS);
@@ -505,6 +506,7 @@ impl<'a> Grey<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::samples;
 
     #[test]
     fn a_drawing_comes_back() {
@@ -518,7 +520,7 @@ mod tests {
 
     #[test]
     fn neighbour_words_equal_single_neighbours_at_every_width() {
-        for width in 1..=2 * WORD_BITS + 3 {
+        for width in (1..=2 * WORD_BITS + 3).rev().take(samples(usize::MAX, 8)) {
             let mut words = [0; 64];
             let size = Size::new(width, 5).unwrap();
             let mut bitmap = Bitmap::new(size, &mut words).unwrap();

@@ -2,11 +2,13 @@
 //! (the profile of these tests checks), its lists hang together, the same memory used again gives the
 //! same answer, and memory that is too short is a finding.
 
+use host::memory::Storage;
 use oracle::core::{Core, Picture, hangs_together, picture, size};
 use oracle::raster::Random;
-use shared::bitmap::WORD_BITS;
+use shared::arena::Arena;
+use shared::bitmap::{Grey, Size, WORD_BITS};
 use shared::fixed::PX;
-use shared::pipeline::{Finding, Outcome, Settings};
+use shared::pipeline::{Finding, Outcome, Run, Settings, Side};
 use shared::stage::binarise::{Polarity, Threshold};
 use shared::stage::correspond::PaperMatching;
 use shared::stage::depth::Optics;
@@ -104,6 +106,22 @@ fn pictures_of_no_size_or_of_two_sizes_are_refused() {
         }
         let pair = [picture(30, 20, |_, _| 9), picture(20, 30, |_, _| 9)];
         assert!(matches!(answer(&mut core, &pair, &settings), Err(Finding::SizesDiffer { .. })));
+    }
+}
+
+#[test]
+fn views_of_two_sizes_are_refused_step_by_step_too() {
+    let mut storage = Storage::new(30, 30).unwrap();
+    for settings in [Settings::new(OPTICS), Settings::paper(OPTICS, PaperMatching::default())] {
+        let mut memory = storage.lend();
+        let mut run = Run::new(&mut memory, &settings);
+        let bytes: Vec<u8> = (0..600).map(|i| if (200..450).contains(&i) { 200 } else { 9 }).collect();
+        for (side, width) in [(Side::Left, 30), (Side::Right, 20)] {
+            let grey = Grey::new(Size::new(width, 600 / width).unwrap(), width, &bytes).unwrap();
+            let eye = &mut memory.eyes[side as usize];
+            run.outline(side, grey, eye, Arena::new(memory.scratch), &mut ()).unwrap();
+        }
+        assert!(matches!(run.pair(&mut memory, &mut ()), Err(Finding::SizesDiffer { .. })));
     }
 }
 

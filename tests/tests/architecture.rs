@@ -171,3 +171,26 @@ fn unsafe_stays_with_registers_and_on_its_list() {
     let manifest = fs::read_to_string(root().join("Cargo.toml")).unwrap();
     assert!(manifest.contains("unsafe_code = \"deny\""));
 }
+
+/// Every fault's row names tests, and each stands where the row says.
+#[test]
+fn faults_name_tests_that_exist() {
+    let document = fs::read_to_string(root().join("docs/reliability.md")).unwrap();
+    let faults = document.split("\n## ").find(|section| section.starts_with("Faults\n")).unwrap();
+    for row in faults.lines().filter(|line| line.starts_with("| ")).skip(1) {
+        let (mut place, mut named) = (PathBuf::new(), 0);
+        for (at, part) in row.split('`').enumerate() {
+            let folder = if part.contains('/') { "" } else { "tests/tests" };
+            let file = root().join(folder).join(part).with_extension("rs");
+            if at % 2 == 1 && file.is_file() {
+                place = file;
+            }
+            for test in words(part).filter(|word| at % 2 == 0 && word.matches('_').count() > 1) {
+                let code = fs::read_to_string(&place).unwrap_or_default();
+                assert!(code.contains(&format!("fn {test}(")), "{} has no {test}", place.display());
+                named += 1;
+            }
+        }
+        assert!(named > 0, "no test is named: {row}");
+    }
+}

@@ -7,6 +7,7 @@ use host::render::Noise;
 use host::shape::Shape;
 use host::view::Pinhole;
 use image::{GrayImage, imageops};
+use oracle::gates::turned_coin;
 use oracle::scene::{Pair, drawn_pair, model, pair, right_moved_down, views};
 use shared::fixed::{ONE, PX};
 use shared::pipeline::{Finding, Side};
@@ -122,6 +123,40 @@ fn a_circle_is_nothing_unusual() {
         let found = warnings(&pair);
         assert!(found.iter().all(|f| matches!(f, Finding::Ambiguous(_))), "{found:?}");
     }
+}
+
+/// Invariants alone would turn the hull; by the rows the coin is as far away as it is.
+#[test]
+fn a_symmetric_outline_is_told_and_the_rows_decide() {
+    let model = outcome(&turned_coin()).unwrap();
+    let told = |f: &Finding| matches!(f, Finding::Ambiguous(1..));
+    assert!(model.outcome.findings.iter().any(told), "{:?}", model.outcome.findings);
+    let plain = outcome(&drawn_pair(40.0, 0.0, disc(180.0, 120.0, 60.0))).unwrap();
+    let [depth, expected] = [&model, &plain].map(|model| {
+        let deep = model.mesh.vertices.iter().map(|v| v.z);
+        deep.sum::<f64>() / model.mesh.vertices.len() as f64
+    });
+    assert!((depth / expected - 1.0).abs() < 0.01, "{depth} mm, and {expected} mm of a plain disc");
+}
+
+/// Where the image cuts it off, an outline is another in each view, which says nothing of symmetry.
+#[test]
+fn an_object_cut_off_is_not_told_to_be_symmetric() {
+    let mut turned = 0;
+    for k in 0..12 {
+        let phase = f64::from(k) / 2.0;
+        let bean = |u: f64, v: f64| {
+            let (x, y) = (u - 290.0, v - 120.0);
+            let angle = y.atan2(x) + phase;
+            x.hypot(y) < 50.0 + 14.0 * angle.cos() + 9.0 * (2.0 * angle).sin()
+        };
+        let Ok(model) = outcome(&drawn_pair(25.0, 0.0, bean)) else { continue };
+        let by_shape = model.outcome.cuts.as_ref().is_some_and(|cuts| cuts.shift != 0);
+        turned += u32::from(by_shape);
+        let told = |f: &Finding| matches!(f, Finding::Ambiguous(_));
+        assert!(!(by_shape && model.outcome.findings.iter().any(told)), "{k}: {:?}", model.outcome.findings);
+    }
+    assert!(turned > 0, "none of them is cut off so that it fits better when turned");
 }
 
 #[test]

@@ -2,13 +2,15 @@
 //! are answered.
 
 use heapless::Vec as List;
+use host::reconstruct::{Options, Workspace};
 use host::shape::Shape as Solid;
+use host::source::serial::inbox::{Inbox, Message};
 use host::stage::rectify::Rectification;
 use oracle::cases;
 use oracle::link;
 use oracle::raster::Random;
 use oracle::scene::pair;
-use oracle::wire::{Lists, OPTICS, bytes, check, describe, read, report, survive, wrench};
+use oracle::wire::{Lists, OPTICS, bytes, check, describe, model, read, report, small, survive, wrench};
 use shared::limits::CapacityError;
 use shared::pipeline::{Finding, Outcome};
 use shared::point::{Direction, PixelPoint};
@@ -135,6 +137,48 @@ fn spoilt_shapes_of_scenes_are_answered() {
         }
         survive(*kind, &spoilt);
     }
+}
+
+/// Whether a host makes a model of a pair's payload.
+fn has_model(workspace: &mut Workspace, inbox: &mut Inbox, (kind, payload): (u8, &[u8])) -> bool {
+    let frame = Frame { kind, sequence: 1, repeated: false, payload };
+    let Ok(Message::Pair(heard)) = inbox.read(&frame) else { return false };
+    let Ok(outcome) = heard.result else { return false };
+    let (mut memory, options) = (inbox.memory(), Options::default());
+    let made = workspace.reconstruct_shape((&mut memory, outcome), None, &model(None), &options, &mut ());
+    made.map(|made| workspace.recycle(made)).is_ok()
+}
+
+#[test]
+fn a_host_answers_whatever_shape_it_reads() {
+    let (mut workspace, mut inbox) = (Workspace::default(), Inbox::new().unwrap());
+    let frame = |shape: Shape<'_>| link::frames(&bytes(&report(Ok(shape)))).remove(0);
+    let mut models = |kind, payload: &[u8]| has_model(&mut workspace, &mut inbox, (kind, payload));
+    small(|whole| {
+        let uncut = [&[][..]; 2];
+        let parts = [
+            Shape { contour: &[], loops: &[], matches: &[], ..whole },
+            Shape { branches: &[], controls: &[], ..whole },
+            Shape { contour: &[], loops: &[], matches: &[], branches: &[], controls: &[], ..whole },
+            Shape { hulls: uncut, ..whole },
+        ];
+        for shape in parts {
+            let (kind, _, payload) = frame(shape);
+            models(kind, &payload);
+        }
+    });
+    let (kind, _, sound) = describe(&wrench(), OPTICS, frame).unwrap();
+    assert!(models(kind, &sound));
+    let mut random = Random(29);
+    let made = (0..200).filter(|_| {
+        let mut spoilt = sound.clone();
+        for _ in 0..=random.below(3) {
+            let at = random.below(spoilt.len() as u64) as usize;
+            spoilt[at] ^= 1 << random.below(8);
+        }
+        models(kind, &spoilt)
+    });
+    assert!(made.count() > 10, "most damage is refused before it is a shape");
 }
 
 #[test]

@@ -33,6 +33,10 @@ pub fn curve_balls(
 ) {
     balls.clear();
     chains.clear();
+    // Only a spoilt message has curves and no contour: they touch nothing.
+    if edges.is_empty() {
+        return;
+    }
     for branch in branches {
         let Some(curve) = branch.curve(controls) else { continue };
         let start = balls.len();

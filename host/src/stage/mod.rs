@@ -1,4 +1,4 @@
-//! The stages that follow the core, in the order in which data flows through them.
+//! The host's stages, in the order in which data flows through them: `rectify` before the core, the others after it.
 
 pub mod rectify;
 pub mod balls;

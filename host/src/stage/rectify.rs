@@ -41,7 +41,7 @@ use crate::calibration::{CalibrationError, Camera, StereoCamera};
 use canvas::Canvas;
 pub use device::device_images;
 
-/// Longest side of a rectified image, px: coordinates of 1/16 px still fit 16 bits with a sign.
+/// Longest side of an image that is made here, px.
 pub const MAX_SIDE: u32 = 2047;
 /// What a rectified calibration may lack of being one, in radians or relative: 0.002 px in the rows
 /// at a focal length of 2000 px.

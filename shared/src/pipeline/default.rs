@@ -122,7 +122,7 @@ fn seed(
         let pairs = cuts.left.into_iter().zip(cuts.right).filter(whole);
         let cut_off = pairs.clone().count() < cuts.left.len();
         let contradicted = !cut_off && cuts.shift != 0;
-        if cuts.least != 0 && !contradicted {
+        if cuts.least != 0 && cuts.shift == 0 {
             gates.meet(Finding::Ambiguous(cuts.least))?;
         }
         let seen = pairs.map(|(a, b)| observation(a, b.u));

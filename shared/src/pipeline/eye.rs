@@ -160,7 +160,8 @@ fn silhouette<'a>(
 }
 
 /// The box of the object in a picture, found and judged as a run would: what a rectification is laid
-/// around. The lent memory is that of a mask, and scratch for a filtered picture and two masks.
+/// around. The lent memory is that of a mask, and scratch as for an outline of no points
+/// ([`outline_words`](super::outline_words)).
 ///
 /// # Errors
 /// The first [`Finding`] that refuses.

@@ -50,7 +50,7 @@ pub enum Finding {
     SkeletonErased(Side),
     /// Share of the left contour's row crossings without partner, in 1/65536.
     Unmatched(i32),
-    /// The paper's hull matching found no map.
+    /// No plane could be laid through what the hulls match; of the paper's matching, no affine map.
     NoMap,
     /// A list was too short.
     Capacity(CapacityError),

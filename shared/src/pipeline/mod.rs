@@ -159,10 +159,7 @@ pub fn run(
     observer: &mut impl Observer,
 ) -> Result<Outcome, Finding> {
     let mut run = Run::new(memory, settings);
-    if left.size() != right.size() {
-        let pair = |s: Size| (s.width, s.height);
-        run.gates.meet(Finding::SizesDiffer { left: pair(left.size()), right: pair(right.size()) })?;
-    }
+    same_size(left.size(), right.size())?;
     let mut see = |side: Side, grey| {
         let eye = &mut memory.eyes[side as usize];
         run.outline(side, grey, eye, Arena::new(memory.scratch), observer)?;
@@ -235,6 +232,7 @@ impl Run {
             let side = if self.figures[0].is_none() { Side::Left } else { Side::Right };
             return Err(Finding::NoObject(side, 0));
         };
+        same_size(left.size, right.size)?;
         compare(&[left, right], &mut self.gates)?;
         let (settings, gates) = (&self.settings, &mut self.gates);
         match settings.method {
@@ -243,6 +241,12 @@ impl Run {
         }
         Ok(self.gates.outcome)
     }
+}
+
+/// Masks of two sizes have no rows in common, whatever the method.
+fn same_size(left: Size, right: Size) -> Result<(), Finding> {
+    let sides = |size: Size| (size.width, size.height);
+    if left == right { Ok(()) } else { Err(Finding::SizesDiffer { left: sides(left), right: sides(right) }) }
 }
 
 /// Gates that look at both views; notes the vertical offset.

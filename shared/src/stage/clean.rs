@@ -78,7 +78,7 @@ pub fn keep_largest(bitmap: &mut Bitmap<'_>, scratch: Arena<'_>) -> Result<Compo
     Ok(found)
 }
 
-/// Set the pixels of every 4-connected hole of fewer than `below` pixels; says what that were. What is
+/// Set the pixels of every 4-connected hole of fewer than `below` pixels; says what they were. What is
 /// connected to the border of the image is background, not a hole.
 ///
 /// # Errors

@@ -262,6 +262,7 @@ mod tests {
         let mirrored = hull([(60, 0), (100, 30), (90, 90), (20, 100), (10, 30)], PX);
         let found = match_cuts(&house, &mirrored).unwrap();
         assert!(found.errors[0] > found.errors[found.least]);
+        assert_eq!((found.shift, found.least != 0), (found.least, true), "and that is no tie");
     }
 
     #[test]

@@ -145,7 +145,7 @@ fn moved_down(rows: f64) -> Pair {
 }
 
 /// A coin with shallow bumps, which was turned a little between the views: its outline fits as well when turned.
-fn turned_coin() -> Pair {
+pub fn turned_coin() -> Pair {
     let coin = |middle: f64, phase: f64| {
         move |u: f64, v: f64| {
             let (x, y) = (u - middle, v - 120.0);

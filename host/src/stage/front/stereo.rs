@@ -137,7 +137,7 @@ const ROUNDS: usize = 4;
 const MOST_GAIN: f64 = 4.0;
 /// What the rows may be moved by at a time, and from what is known of them, px.
 const MOST_ROWS: [f64; 2] = [0.1, 0.75];
-/// How firmly gain and rows stay as they are: so many pixels of slope 1 would say so.
+/// How firmly the gain stays at 1, the offset at 0 and the rows as they are: so many pixels of slope 1 would say so.
 const FIRM: [f64; 3] = [100.0, 1.0, 50.0];
 
 /// The response that explains most of what was seen, from one near it.

@@ -113,7 +113,7 @@ impl Work for Count<'_> {
         let mut faces = 0;
         if vertices > 0 {
             for tetrahedron in &TETRAHEDRA {
-                let [triangles, quadrilaterals] = cut(tetrahedron, &inside);
+                let [triangles, quadrilaterals] = cut(corners(tetrahedron, &inside));
                 faces += triangles.count_ones() + 2 * quadrilaterals.count_ones();
             }
         }
@@ -154,15 +154,17 @@ impl Work for PutFaces<'_> {
         let inside = &self.cuts[0].expect("a block").inside;
         let (mut triangle, mut quadrilateral) = (0, 0);
         for (tetrahedron, rings) in TETRAHEDRA.iter().zip(&RINGS) {
-            let [a, b, c, d] = corners(tetrahedron, inside);
-            for bit in bits((a | b | c | d) & !(a & b & c & d)) {
-                let set = (a >> bit & 1) | (b >> bit & 1) << 1 | (c >> bit & 1) << 2 | (d >> bit & 1) << 3;
-                let ring = rings[set as usize].map(|edge| numbers.at(PLACES[bit] + usize::from(edge)));
+            let corners = corners(tetrahedron, inside);
+            let [triangles, quads] = cut(corners);
+            for bit in bits(triangles | quads) {
+                let [a, b, c, d] = corners.map(|corner| corner >> bit & 1);
+                let ring = rings[(a | b << 1 | c << 2 | d << 3) as usize]
+                    .map(|edge| numbers.at(PLACES[bit] + usize::from(edge)));
                 // Without a branch, as nobody could foretell it: what does not count is written over.
                 let [p, q, r, _] = ring;
                 self.faces[triangle] = [p, q, r];
                 quadrilaterals[quadrilateral] = ring;
-                let is_triangle = usize::from(TRIANGLES >> set & 1);
+                let is_triangle = (triangles >> bit & 1) as usize;
                 triangle += is_triangle;
                 quadrilateral += 1 - is_triangle;
             }
@@ -175,16 +177,6 @@ impl Work for PutFaces<'_> {
     }
 }
 
-/// The sets of a tetrahedron's corners that are cut off in a triangle, a bit each.
-const TRIANGLES: u16 = {
-    let (mut sets, mut set) = (0, 0_u16);
-    while set < 16 {
-        sets |= ((set.count_ones() % 2) as u16) << set;
-        set += 1;
-    }
-    sets
-};
-
 /// Of each of a tetrahedron's corners, the cubes whose corner it is that are inside.
 #[inline(always)]
 fn corners(tetrahedron: &Tetrahedron, inside: &[[u64; 8]; 2]) -> [u64; 4] {
@@ -193,10 +185,9 @@ fn corners(tetrahedron: &Tetrahedron, inside: &[[u64; 8]; 2]) -> [u64; 4] {
     [of(a), of(b), of(c), of(d)]
 }
 
-/// The cubes of which a tetrahedron is cut in a triangle, and those of which in a quadrilateral.
+/// The cubes of which a tetrahedron with these [`corners`] is cut in a triangle, and those of which in a quadrilateral.
 #[inline(always)]
-fn cut(tetrahedron: &Tetrahedron, inside: &[[u64; 8]; 2]) -> [u64; 2] {
-    let [a, b, c, d] = corners(tetrahedron, inside);
+fn cut([a, b, c, d]: [u64; 4]) -> [u64; 2] {
     let triangles = a ^ b ^ c ^ d;
     [triangles, (a | b | c | d) & !(a & b & c & d) & !triangles]
 }
