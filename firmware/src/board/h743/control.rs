@@ -99,8 +99,17 @@ impl i2c::ErrorType for Control {
     type Error = Error;
 }
 
+/// What the sensors' protocol has of it goes the driver's own, shorter way.
 impl i2c::I2c for Control {
+    fn read(&mut self, address: u8, read: &mut [u8]) -> Result<(), Error> {
+        self.bus.blocking_read(address, read)
+    }
+
+    fn write(&mut self, address: u8, write: &[u8]) -> Result<(), Error> {
+        self.bus.blocking_write(address, write)
+    }
+
     fn transaction(&mut self, address: u8, operations: &mut [Operation<'_>]) -> Result<(), Error> {
-        i2c::I2c::transaction(&mut self.bus, address, operations)
+        self.bus.blocking_transaction(address, operations)
     }
 }
