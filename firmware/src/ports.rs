@@ -194,7 +194,7 @@ pub trait Link {
 pub enum LinkError {
     /// Bytes came faster than they were taken; some are lost.
     Overrun,
-    /// The host took nothing for this time, us.
+    /// The host has not taken all of it within this time, us.
     TimeLimit(u32),
     /// There is no host.
     Closed,

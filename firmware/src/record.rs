@@ -2,7 +2,8 @@
 //!
 //! A sector holds a header and behind it the record. A new record goes to the sector that does not hold the
 //! newest one: erased first, the record written, then its header, in one piece. So whatever happens
-//! meanwhile, the old record or the new one stands whole; which, sequence numbers tell.
+//! meanwhile, the old record or the new one stands whole; which, sequence numbers tell. A sector that lost power
+//! meanwhile may be one that flash refuses to read: it is as one that is damaged.
 
 use crate::ports::{Flash, FlashError};
 use core::ops::ControlFlow;
@@ -89,16 +90,23 @@ impl<F: NorFlash> Record<F> {
         let mut newest: Option<(u32, Header)> = None;
         let mut damaged = false;
         for sector in [0, 1] {
-            let Some(header) = self.header(sector)? else { continue };
-            let mut digest = Header::digest(header.sequence, header.length);
-            self.each(sector, header.length, |_, bytes| digest.update(bytes))?;
-            let whole = digest.finalize() == header.sum;
-            damaged |= !whole;
-            if whole && newest.is_none_or(|(_, other)| header.sequence > other.sequence) {
-                newest = Some((sector, header));
+            match self.whole(sector) {
+                Ok(Some(header)) if newest.is_none_or(|(_, other)| header.sequence > other.sequence) => {
+                    newest = Some((sector, header));
+                }
+                Ok(_) => (),
+                Err(_) => damaged = true,
             }
         }
         if newest.is_none() && damaged { Err(FlashError::Damaged) } else { Ok(newest) }
+    }
+
+    /// The header of a sector's record, if it has one.
+    fn whole(&mut self, sector: u32) -> Result<Option<Header>, FlashError> {
+        let Some(header) = self.header(sector)? else { return Ok(None) };
+        let mut digest = Header::digest(header.sequence, header.length);
+        self.each(sector, header.length, |_, bytes| digest.update(bytes))?;
+        if digest.finalize() == header.sum { Ok(Some(header)) } else { Err(FlashError::Damaged) }
     }
 
     fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
@@ -163,6 +171,7 @@ mod tests {
     use super::*;
     use embedded_storage::nor_flash::{ErrorType, NorFlashErrorKind, ReadNorFlash};
     extern crate std;
+    use core::ops::Range;
     use std::vec;
     use std::vec::Vec;
 
@@ -172,12 +181,21 @@ mod tests {
     struct Model {
         bytes: Vec<u8>,
         fuse: usize,
+        /// Whether what loses power in the middle is refused from then on, until it is erased.
+        strict: bool,
+        refused: Range<usize>,
     }
 
     impl Model {
-        fn changes(&mut self, all: usize) -> (usize, Result<(), NorFlashErrorKind>) {
+        fn changes(&mut self, from: u32, all: usize) -> (usize, Result<(), NorFlashErrorKind>) {
             self.fuse = self.fuse.saturating_sub(1);
-            if self.fuse == 0 { (all / 2, Err(NorFlashErrorKind::Other)) } else { (all, Ok(())) }
+            if self.fuse > 0 {
+                return (all, Ok(()));
+            }
+            if self.strict {
+                self.refused = from as usize..from as usize + all;
+            }
+            (all / 2, Err(NorFlashErrorKind::Other))
         }
     }
 
@@ -188,6 +206,9 @@ mod tests {
     impl ReadNorFlash for Model {
         const READ_SIZE: usize = 1;
         fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Self::Error> {
+            if self.refused.contains(&(offset as usize)) {
+                return Err(NorFlashErrorKind::Other);
+            }
             let all = self.bytes.get(offset as usize..).and_then(|rest| rest.get(..bytes.len()));
             bytes.copy_from_slice(all.ok_or(NorFlashErrorKind::OutOfBounds)?);
             Ok(())
@@ -202,13 +223,16 @@ mod tests {
         const ERASE_SIZE: usize = 256;
         fn erase(&mut self, from: u32, to: u32) -> Result<(), Self::Error> {
             assert!(from.is_multiple_of(256) && to == from + 256 && from >= 256, "{from}..{to}");
-            let (done, result) = self.changes((to - from) as usize);
+            if self.refused.start >= from as usize && self.refused.end <= to as usize {
+                self.refused = 0..0;
+            }
+            let (done, result) = self.changes(from, (to - from) as usize);
             self.bytes[from as usize..][..done].fill(0xFF);
             result
         }
         fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Self::Error> {
             assert!((offset as usize).is_multiple_of(UNIT) && bytes.len() == UNIT);
-            let (done, result) = self.changes(bytes.len());
+            let (done, result) = self.changes(offset, bytes.len());
             for (place, byte) in self.bytes[offset as usize..].iter_mut().zip(&bytes[..done]) {
                 *place &= byte;
             }
@@ -218,7 +242,8 @@ mod tests {
 
     /// Some program, then two sectors.
     fn new() -> Record<Model> {
-        Record::new(Model { bytes: vec![0x5A; 3 * 256], fuse: usize::MAX }, 256)
+        let bytes = vec![0x5A; 3 * 256];
+        Record::new(Model { bytes, fuse: usize::MAX, strict: false, refused: 0..0 }, 256)
     }
 
     fn load(record: &mut Record<Model>) -> Result<Vec<u8>, FlashError> {
@@ -246,17 +271,34 @@ mod tests {
         record.save(&[1; 100]).unwrap();
         record.save(&[2; 100]).unwrap();
         let mut lost = 0;
-        for fuse in 1..=6 {
-            let mut cut = Record::new(Model { fuse, ..record.flash.clone() }, 256);
-            assert_eq!(cut.save(&[3; 100]), Err(FlashError::Failing), "{fuse}");
+        for (fuse, strict) in (1..=6).flat_map(|fuse| [(fuse, false), (fuse, true)]) {
+            let mut cut = Record::new(Model { fuse, strict, ..record.flash.clone() }, 256);
+            assert_eq!(cut.save(&[3; 100]), Err(FlashError::Failing), "{fuse} {strict}");
             cut.flash.fuse = usize::MAX;
             let found = load(&mut cut);
-            assert!(found == Ok(vec![2; 100]) || found == Ok(vec![3; 100]), "{fuse}: {found:?}");
+            assert!(found == Ok(vec![2; 100]) || found == Ok(vec![3; 100]), "{fuse} {strict}: {found:?}");
             lost += usize::from(found == Ok(vec![2; 100]));
             cut.save(&[4; 10]).unwrap();
             assert_eq!(load(&mut cut), Ok(vec![4; 10]));
         }
-        assert!(lost >= 5, "power went while the new one was not whole yet");
+        assert!(lost >= 11, "power went while the new one was not whole yet");
+    }
+
+    /// With no other record to go back to, none is there, and the next one is saved.
+    #[test]
+    fn a_first_record_that_flash_refuses_to_read_is_a_damaged_one() {
+        for fuse in 1..=6 {
+            let mut cut = new();
+            (cut.flash.fuse, cut.flash.strict) = (fuse, true);
+            assert_eq!(cut.save(&[3; 100]), Err(FlashError::Failing), "{fuse}");
+            cut.flash.fuse = usize::MAX;
+            assert!(
+                matches!(load(&mut cut), Ok(none) if none.is_empty())
+                    || load(&mut cut) == Err(FlashError::Damaged)
+            );
+            cut.save(&[4; 10]).unwrap();
+            assert_eq!(load(&mut cut), Ok(vec![4; 10]), "{fuse}");
+        }
     }
 
     #[test]

@@ -17,11 +17,13 @@ enum Happening {
         length: u8,
         seed: u8,
     },
-    /// Power goes in the middle of this write or erasure of a save.
+    /// Power goes in the middle of this write or erasure of a save, and what it was about is refused from then on, or
+    /// is what it has become.
     Cut {
         length: u8,
         seed: u8,
         at: u8,
+        refused: bool,
     },
     Flip {
         at: u16,
@@ -32,9 +34,19 @@ enum Happening {
     },
 }
 
-/// Two sectors; writing clears bits and sets none. The power that is left is a number of writes and erasures.
+/// Two sectors; writing clears bits and sets none.
+#[derive(Debug)]
+struct Cells {
+    bytes: Vec<u8>,
+    /// How many writes and erasures there is power for.
+    power: usize,
+    /// Whether what power is lost over is refused when it is read.
+    refuses: bool,
+    refused: Vec<bool>,
+}
+
 #[derive(Clone, Debug)]
-struct Chip(Rc<RefCell<(Vec<u8>, usize)>>);
+struct Chip(Rc<RefCell<Cells>>);
 
 impl Chip {
     fn change(
@@ -43,11 +55,13 @@ impl Chip {
         len: usize,
         to: impl Fn(u8, usize) -> u8,
     ) -> Result<(), NorFlashErrorKind> {
-        let (bytes, power) = &mut *self.0.borrow_mut();
-        *power = power.saturating_sub(1);
-        let done = if *power == 0 { len / 2 } else { len };
-        bytes[from..from + done].iter_mut().enumerate().for_each(|(k, byte)| *byte = to(*byte, k));
-        if *power == 0 { Err(NorFlashErrorKind::Other) } else { Ok(()) }
+        let cells = &mut *self.0.borrow_mut();
+        cells.power = cells.power.saturating_sub(1);
+        let lost = cells.power == 0;
+        let done = if lost { len / 2 } else { len };
+        cells.bytes[from..from + done].iter_mut().enumerate().for_each(|(k, byte)| *byte = to(*byte, k));
+        cells.refused[from..from + len].fill(lost && cells.refuses);
+        if lost { Err(NorFlashErrorKind::Other) } else { Ok(()) }
     }
 }
 
@@ -58,7 +72,11 @@ impl ErrorType for Chip {
 impl ReadNorFlash for Chip {
     const READ_SIZE: usize = 1;
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Self::Error> {
-        bytes.copy_from_slice(&self.0.borrow().0[offset as usize..][..bytes.len()]);
+        let (cells, place) = (self.0.borrow(), offset as usize..offset as usize + bytes.len());
+        if cells.refused[place.clone()].contains(&true) {
+            return Err(NorFlashErrorKind::Other);
+        }
+        bytes.copy_from_slice(&cells.bytes[place]);
         Ok(())
     }
     fn capacity(&self) -> usize {
@@ -86,7 +104,9 @@ fuzz_target!(|input: (Vec<Happening>, &[u8])| {
     let (happenings, rest) = input;
     let mut bytes = rest.to_vec();
     bytes.resize(2 * SECTOR, 0xFF);
-    let chip = Chip(Rc::new(RefCell::new((bytes, usize::MAX))));
+    let refused = vec![false; bytes.len()];
+    let cells = Cells { bytes, power: usize::MAX, refuses: false, refused };
+    let chip = Chip(Rc::new(RefCell::new(cells)));
     let mut record = Record::new(chip.clone(), 0);
     // What may be loaded, and whether nothing else may.
     let (mut saved, mut last): (Vec<Vec<u8>>, Option<Vec<u8>>) = (vec![Vec::new()], None);
@@ -100,11 +120,11 @@ fuzz_target!(|input: (Vec<Happening>, &[u8])| {
                 }
                 saved.push(content);
             }
-            Happening::Cut { length, seed, at } => {
+            Happening::Cut { length, seed, at, refused } => {
                 let content = content(length, seed);
-                chip.0.borrow_mut().1 = usize::from(at) + 1;
+                (chip.0.borrow_mut().power, chip.0.borrow_mut().refuses) = (usize::from(at) + 1, refused);
                 let result = record.save(&content);
-                chip.0.borrow_mut().1 = usize::MAX;
+                chip.0.borrow_mut().power = usize::MAX;
                 match result {
                     Ok(()) => last = Some(content.clone()),
                     Err(FlashError::Failing) => {
@@ -118,7 +138,7 @@ fuzz_target!(|input: (Vec<Happening>, &[u8])| {
                 saved.push(content);
             }
             Happening::Flip { at, bit } => {
-                chip.0.borrow_mut().0[usize::from(at) % (2 * SECTOR)] ^= 1 << (bit % 8);
+                chip.0.borrow_mut().bytes[usize::from(at) % (2 * SECTOR)] ^= 1 << (bit % 8);
                 last = None;
             }
             Happening::Load { room } => {

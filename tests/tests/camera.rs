@@ -348,6 +348,24 @@ fn a_bus_that_breaks_is_told() {
     assert_same(&shoot(&mut eyes).unwrap(), &ramps());
 }
 
+/// A sensor that holds its bus, as one does whose board was reset in the middle of a reading, lets go of it at a start,
+/// or at the next one.
+#[test]
+fn a_control_bus_that_is_held_is_told_and_freed() {
+    let (bench, mut eyes) = bench(Wiring::default(), |b| b.sensors[1].borrow_mut().holds = 1);
+    eyes.start(Exposure::default()).unwrap();
+    assert_same(&shoot(&mut eyes).unwrap(), &ramps());
+    bench.sensors[1].borrow_mut().holds = 3;
+    let held = CameraError { side: Side::Right, fault: CameraFault::ControlBus };
+    assert_eq!(eyes.expose(Exposure::new(200, 16)), Err(held));
+    assert_eq!(eyes.capture().unwrap_err().fault, CameraFault::NotStarted);
+    for _ in 0..2 {
+        assert_eq!(eyes.start(Exposure::default()), Err(held));
+    }
+    eyes.start(Exposure::default()).unwrap();
+    assert_same(&shoot(&mut eyes).unwrap(), &ramps());
+}
+
 /// The order of calls: nothing before a start, a picture is read once, or not at all.
 #[test]
 fn pictures_are_read_once() {

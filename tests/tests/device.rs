@@ -600,6 +600,33 @@ fn the_real_driver_in_the_loop() {
     assert!(bench.hungriest() < 3_000_000, "a watchdog of 4 s does not bite");
 }
 
+/// A control bus that dies while the device runs, and stays dead for some seconds, is told and counted, and nobody is
+/// needed for its eyes to come back.
+#[test]
+fn a_control_bus_that_dies_comes_back_by_itself() {
+    let world = CameraBench::new(Wiring::default(), scenes(Solid::Capsule));
+    let module = |eye| Module::new(world.picture_bus(eye), world.control_bus(eye));
+    let eyes = Modules::new(module(0), module(1), world.time.clone(), world.time.clone());
+    let mut bench = Bench::new(eyes, world.time.clone(), &Shared::default());
+    bench.next_hello();
+    assert_eq!(bench.ask(&ToDevice::Calibration(plain())), Ok(()));
+    assert_eq!(bench.ask(&ToDevice::Start), Ok(()));
+    (0..5).for_each(|_| drop(bench.report()));
+    let before = bench.health();
+    world.sensors[0].borrow_mut().holds = 3;
+    // Pictures go on without the bus until something is ordered of the eyes.
+    let ordered = [wire::Exposure { lines: 100, gain: 256 }; 2];
+    assert_eq!(bench.ask(&ToDevice::Exposure(ExposureSetting::Fixed(ordered))), Ok(()));
+    while bench.device().condition() != Condition::Faulty {
+        let _ = bench.step();
+    }
+    assert_eq!(bench.hello().sensors, [0; 2]);
+    assert_eq!(bench.report().exposures, ordered);
+    assert_eq!(bench.hello().sensors, [0x2642; 2]);
+    assert_eq!(bench.health().restarts - before.restarts, 3, "two in vain");
+    assert!(bench.hungriest() < 3_000_000, "a watchdog of 4 s does not bite");
+}
+
 fn any_event() -> impl Strategy<Value = Event> {
     let side = prop_oneof![Just(Side::Left), Just(Side::Right)];
     let fault = prop_oneof![

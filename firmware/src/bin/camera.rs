@@ -30,7 +30,7 @@ mod board {
         }
     }
 
-    /// What is wrong with settings, memory or processor is wrong after a reset too.
+    /// Wait for the watchdog: what a reset mends is well then, and hello tells of it; what it does not is told again.
     fn stop() -> ! {
         loop {
             wfi();

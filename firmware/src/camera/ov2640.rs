@@ -5,11 +5,11 @@
 //! shared bus reaches both, and what is read is the AND of both; so both are written alike, one after the
 //! other, and nothing here depends on which of them answers.
 
+use super::control::ControlBus;
 use super::registers::{
     BANK, BARS, Bank, COM7, PIXEL_CLOCK, PRODUCT_HIGH, PRODUCT_LOW, RESET, RESOLUTION, TABLE, Write, exposure,
 };
 use crate::ports::{CameraFault, Exposure};
-use embedded_hal::i2c::I2c;
 
 /// Where every OV2640 answers, 7 bits.
 pub const ADDRESS: u8 = 0x30;
@@ -26,10 +26,15 @@ pub struct Sensor<I> {
     bus: I,
 }
 
-impl<I: I2c> Sensor<I> {
+impl<I: ControlBus> Sensor<I> {
     /// The sensor behind a bus.
     pub const fn new(bus: I) -> Self {
         Self { bus }
+    }
+
+    /// Free the bus, which a transfer that did not end may hold.
+    pub fn free(&mut self) {
+        self.bus.clear();
     }
 
     /// Its product number.

@@ -5,12 +5,12 @@
 //! frame, and the skew between both is up to one frame. It is measured, not mended.
 
 use super::arducam::{self, ArduChip, ROW_BYTES};
+use super::control::ControlBus;
 use super::ov2640::{self, Sensor};
 use super::registers;
 use super::test_picture::{LumaPlace, TestPicture};
 use crate::ports::{CameraError, CameraFault, CameraPair, Clock, Exposure, Identity, Side, Stamps};
 use embedded_hal::delay::DelayNs;
-use embedded_hal::i2c::I2c;
 use embedded_hal::spi::SpiDevice;
 
 /// How long a capture may take, us: several of the slowest frames.
@@ -28,7 +28,7 @@ pub struct Module<S, I> {
     done: Option<u64>,
 }
 
-impl<S: SpiDevice, I: I2c> Module<S, I> {
+impl<S: SpiDevice, I: ControlBus> Module<S, I> {
     /// The module on a picture bus and a control bus.
     pub const fn new(picture: S, control: I) -> Self {
         Self { chip: ArduChip::new(picture), sensor: Sensor::new(control), luma: LumaPlace::Even, done: None }
@@ -83,7 +83,7 @@ pub struct Pair<S, I, D, C> {
     started: bool,
 }
 
-impl<S: SpiDevice, I: I2c, D: DelayNs, C: Clock> Pair<S, I, D, C> {
+impl<S: SpiDevice, I: ControlBus, D: DelayNs, C: Clock> Pair<S, I, D, C> {
     /// The left and the right module, not started yet.
     pub fn new(left: Module<S, I>, right: Module<S, I>, delay: D, clock: C) -> Self {
         Self { modules: [left, right], delay, clock, exposure: Exposure::default(), started: false }
@@ -98,6 +98,7 @@ impl<S: SpiDevice, I: I2c, D: DelayNs, C: Clock> Pair<S, I, D, C> {
         }
         both(modules, |m| m.chip.echo())?;
         both(modules, |m| m.chip.set_up())?;
+        modules.iter_mut().for_each(|m| m.sensor.free());
         // Another sensor is not written to.
         both(modules, |m| m.sensor.identify())?;
         both(modules, |m| {
@@ -168,7 +169,7 @@ impl<S: SpiDevice, I: I2c, D: DelayNs, C: Clock> Pair<S, I, D, C> {
     }
 }
 
-impl<S: SpiDevice, I: I2c, D: DelayNs, C: Clock> CameraPair for Pair<S, I, D, C> {
+impl<S: SpiDevice, I: ControlBus, D: DelayNs, C: Clock> CameraPair for Pair<S, I, D, C> {
     const WIDTH: usize = registers::WIDTH;
     const HEIGHT: usize = registers::HEIGHT;
 

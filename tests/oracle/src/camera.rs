@@ -5,7 +5,7 @@
 //! for, a burst without its command, data fetched before they are there or after they ended, a capture begun
 //! twice. What can break in the field is ordered by the fields of [`ArduChip`] and [`Sensor`].
 //!
-//! The model shares nothing with the driver but the trait of the clock. It has its own time: bytes on a bus
+//! The model shares nothing with the driver but the traits of the clock and of the control bus. It has its own time: bytes on a bus
 //! and delays take what they would take.
 
 mod arduchip;
@@ -17,6 +17,7 @@ pub use ov2640::Sensor;
 use embedded_hal::delay::DelayNs;
 use embedded_hal::i2c::{self, I2c, NoAcknowledgeSource};
 use embedded_hal::spi::{self, Mode, Operation, SpiDevice};
+use firmware::camera::control;
 use firmware::ports::Clock;
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
@@ -170,6 +171,9 @@ impl SpiDevice for PictureBus {
     }
 }
 
+/// How long a board tries to begin a transfer on wires that are held, ns.
+const HELD_NS: u64 = 1_000_000_000;
+
 /// SCCB with one or two sensors on it, at 100 kHz.
 #[derive(Debug)]
 pub struct ControlBus {
@@ -188,6 +192,10 @@ impl I2c for ControlBus {
             i2c::Operation::Write(bytes) => bytes.len(),
             i2c::Operation::Read(bytes) => bytes.len(),
         };
+        if self.sensors.iter().any(|sensor| sensor.borrow().holds > 0) {
+            self.time.pass(HELD_NS);
+            return Err(i2c::ErrorKind::Bus);
+        }
         self.time.pass(90_000 * (1 + bytes as u64));
         let answering = |sensor: &&Rc<RefCell<Sensor>>| address == 0x30 && !sensor.borrow().deaf;
         let sensors: Vec<_> = self.sensors.iter().filter(answering).collect();
@@ -202,5 +210,16 @@ impl I2c for ControlBus {
             }
         }
         Ok(())
+    }
+}
+
+impl control::ControlBus for ControlBus {
+    fn clear(&mut self) {
+        // Ten clocks.
+        self.time.pass(100_000);
+        for sensor in &self.sensors {
+            let holds = &mut sensor.borrow_mut().holds;
+            *holds = holds.saturating_sub(1);
+        }
     }
 }

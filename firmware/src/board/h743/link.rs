@@ -1,14 +1,14 @@
 //! The host, on USB or behind ST-Link's virtual serial port: whichever has last said something is answered.
 
-use super::usb;
+use super::{Clock, usb};
 use crate::ports::{self, LinkError};
+use crate::send::send_within;
 use core::sync::atomic::Ordering;
 use embassy_stm32::usart::BufferedUart;
-use embassy_time::{Duration, Instant};
 use embedded_io::{Read as _, Write as _};
 
-/// A host that takes nothing for so long is gone.
-const PATIENCE: Duration = Duration::from_secs(1);
+/// A host that takes longer over a frame is gone, us.
+const PATIENCE: u32 = 1_000_000;
 
 #[derive(Clone, Copy, Debug)]
 enum Host {
@@ -34,6 +34,8 @@ impl ports::Link for Link {
             self.host = Host::Usb;
             return Ok(count);
         }
+        // Of embassy-stm32 0.6.0, which does not wait here but returns 0 when nothing has come; `embedded_io` would let
+        // it wait, and a later version may.
         let count = self.serial.read(buffer).map_err(|_| LinkError::Overrun)?;
         if count > 0 {
             self.host = Host::Serial;
@@ -45,22 +47,12 @@ impl ports::Link for Link {
         match self.host {
             // A wire takes everything, in its own time.
             Host::Serial => self.serial.write_all(bytes).map_err(|_| LinkError::Closed),
-            Host::Usb => send_usb(bytes),
+            Host::Usb => send_within(PATIENCE, &Clock, bytes, |rest| {
+                if !usb::OPEN.load(Ordering::Relaxed) {
+                    return Err(LinkError::Closed);
+                }
+                Ok(usb::OUTGOING.try_write(rest).unwrap_or(0))
+            }),
         }
     }
-}
-
-fn send_usb(mut bytes: &[u8]) -> Result<(), LinkError> {
-    let mut moved = Instant::now();
-    while !bytes.is_empty() {
-        if !usb::OPEN.load(Ordering::Relaxed) {
-            return Err(LinkError::Closed);
-        }
-        if let Ok(count) = usb::OUTGOING.try_write(bytes) {
-            (bytes, moved) = (bytes.get(count..).unwrap_or_default(), Instant::now());
-        } else if moved.elapsed() > PATIENCE {
-            return Err(LinkError::TimeLimit(PATIENCE.as_micros() as u32));
-        }
-    }
-    Ok(())
 }

@@ -5,12 +5,16 @@
 #![expect(unsafe_code, reason = "interrupt handlers and their bindings are unsafe by the runtime's rules")]
 
 mod clocks;
+mod control;
+mod flash;
 mod lamps;
 mod link;
 mod reset;
 mod usb;
 mod watchdog;
 
+pub use control::Control;
+pub use flash::Flash;
 pub use lamps::Lamps;
 pub use link::Link;
 pub use watchdog::Watchdog;
@@ -20,17 +24,17 @@ use crate::device::Birth;
 use crate::drive::Ports;
 use crate::ports;
 use crate::record::Record;
+use control::Wire;
 use cortex_m::Peripherals;
 use defmt_rtt as _;
 use embassy_executor::InterruptExecutor;
-use embassy_stm32::flash::{Blocking, Flash};
 use embassy_stm32::gpio::{AnyPin, Level, Output, Speed};
-use embassy_stm32::i2c::{self, I2c, Master};
+use embassy_stm32::i2c::{self, I2c};
 use embassy_stm32::interrupt::{self, InterruptExt as _, Priority};
 use embassy_stm32::mode::Blocking as Polled;
 use embassy_stm32::spi::{self, Spi, mode};
 use embassy_stm32::time::Hertz;
-use embassy_stm32::{Peri, bind_interrupts, peripherals, usart};
+use embassy_stm32::{Peri, bind_interrupts, pac, peripherals, usart};
 use embassy_time::{Delay, Instant};
 use embedded_hal_bus::spi::ExclusiveDevice;
 use panic_probe as _;
@@ -53,8 +57,6 @@ unsafe fn UART8() {
 
 /// A picture bus with one module on it.
 pub type Pictures = ExclusiveDevice<Spi<'static, Polled, mode::Master>, Output<'static>, Delay>;
-/// A control bus with one sensor on it.
-pub type Control = I2c<'static, Polled, Master>;
 /// Both eyes.
 pub type Cameras = Pair<Pictures, Control, Delay, Clock>;
 
@@ -79,7 +81,7 @@ impl ports::Clock for Clock {
 pub struct Board {
     /// What a device reaches: both eyes, not started yet; the host, on USB or behind ST-Link; time; the end of
     /// flash; the watchdog.
-    pub ports: Ports<Cameras, Link, Clock, Record<Flash<'static, Blocking>>, Watchdog>,
+    pub ports: Ports<Cameras, Link, Clock, Record<Flash>, Watchdog>,
     /// Three lamps.
     pub lamps: Lamps,
     /// Its name, why it has started, and how often it hung.
@@ -89,10 +91,12 @@ pub struct Board {
 impl Board {
     /// Start the board; nothing when it has been started before, or when a driver refuses its settings.
     pub fn take() -> Option<Self> {
+        // Before anything that waits.
+        let watchdog = Watchdog::start();
         let mut core = Peripherals::take()?;
         let p = embassy_stm32::init(clocks::configuration());
         let birth = reset::recall("NUCLEO-H743ZI2");
-        // No master but the processor touches memory: there is no DMA, so caches cannot go stale.
+        // No master but the processor touches memory: there is no DMA, so caches go stale where flash is erased alone.
         core.SCB.enable_icache();
         core.SCB.enable_dcache(&mut core.CPUID);
 
@@ -112,12 +116,22 @@ impl Board {
         let left = eye(
             Spi::new_blocking(p.SPI1, p.PA5, p.PB5, p.PA6, picture),
             p.PD14.into(),
-            I2c::new_blocking(p.I2C1, p.PB8, p.PB9, control),
+            Control::new(
+                I2c::new_blocking(p.I2C1, p.PB8, p.PB9, control),
+                pac::I2C1,
+                Wire::new(pac::GPIOB, 8),
+                Wire::new(pac::GPIOB, 9),
+            ),
         );
         let right = eye(
             Spi::new_blocking(p.SPI4, p.PE2, p.PE6, p.PE5, picture),
             p.PE4.into(),
-            I2c::new_blocking(p.I2C2, p.PF1, p.PF0, control),
+            Control::new(
+                I2c::new_blocking(p.I2C2, p.PF1, p.PF0, control),
+                pac::I2C2,
+                Wire::new(pac::GPIOF, 1),
+                Wire::new(pac::GPIOF, 0),
+            ),
         );
 
         interrupt::UART8.set_priority(Priority::P6);
@@ -137,8 +151,11 @@ impl Board {
                 cameras: Pair::new(left, right, Delay, Clock),
                 link: Link::new(serial),
                 clock: Clock,
-                flash: Record::new(Flash::new_blocking(p.FLASH), CALIBRATION),
-                watchdog: Watchdog::new(p.IWDG1),
+                flash: Record::new(
+                    Flash::new(embassy_stm32::flash::Flash::new_blocking(p.FLASH), core.SCB),
+                    CALIBRATION,
+                ),
+                watchdog,
             },
             lamps: Lamps::new([p.PB0.into(), p.PE1.into(), p.PB14.into()]),
             birth,

@@ -1,8 +1,9 @@
 //! CMSDK APB UART 0: a byte at a time, no interrupts.
 
 use super::register::Register;
-use super::timer::{TICKS, Timer};
+use super::timer::{Clock, Timer};
 use crate::ports::{self, LinkError};
+use crate::send::send_within;
 
 const DATA: Register = Register::at(0x4000_4000);
 const STATE: Register = Register::at(0x4000_4004);
@@ -12,19 +13,19 @@ const DIVIDER: Register = Register::at(0x4000_4010);
 const SEND_FULL: u32 = 1;
 const RECEIVE_FULL: u32 = 2;
 
-/// A host that takes nothing for so long is gone, us.
+/// A host that takes longer over a frame is gone, us. Unlike a wire, a program may be busy or stopped.
 const PATIENCE: u32 = 5_000_000;
 
 /// The serial line.
 #[derive(Debug)]
-pub struct Uart(Timer);
+pub struct Uart(Clock);
 
 impl Uart {
     pub(super) fn start(timer: Timer) -> Self {
         // The emulator takes any speed but none below 16.
         DIVIDER.write(16);
         CONTROL.write(SEND_FULL | RECEIVE_FULL);
-        Self(timer)
+        Self(Clock::new(timer))
     }
 }
 
@@ -42,16 +43,12 @@ impl ports::Link for Uart {
     }
 
     fn send(&mut self, bytes: &[u8]) -> Result<(), LinkError> {
-        for byte in bytes {
-            // Unlike a wire, a program at the other end may be busy or stopped.
-            let since = self.0.ticks();
-            while STATE.read() & SEND_FULL != 0 {
-                if self.0.ticks().wrapping_sub(since) > PATIENCE * TICKS as u32 {
-                    return Err(LinkError::TimeLimit(PATIENCE));
-                }
+        send_within(PATIENCE, &&self.0, bytes, |rest| match rest {
+            [byte, ..] if STATE.read() & SEND_FULL == 0 => {
+                DATA.write(u32::from(*byte));
+                Ok(1)
             }
-            DATA.write(u32::from(*byte));
-        }
-        Ok(())
+            _ => Ok(0),
+        })
     }
 }

@@ -96,6 +96,8 @@ pub struct Sensor {
     pub product: u16,
     /// Whether it answers to nothing.
     pub deaf: bool,
+    /// How often its wires must be freed until it lets go of them.
+    pub holds: u32,
     /// A bank and an address whose writes are lost.
     pub forgets: Option<(u8, u8)>,
     /// Banks and addresses that were written.
@@ -131,6 +133,7 @@ impl Sensor {
             scene,
             product: 0x2642,
             deaf: false,
+            holds: 0,
             forgets: None,
             written: BTreeSet::new(),
             time,
