@@ -1,10 +1,10 @@
 //! A device in the boards' own loop: any bytes and any commands at any time, a flash that holds anything, eyes, link
-//! and flash that break. It goes on, and sends nothing but whole messages.
+//! and flash that break. It goes on, sends nothing but whole messages, and loses count of no pair.
 #![no_main]
 
 use arbitrary::Arbitrary;
 use embedded_hal::delay::DelayNs;
-use firmware::device::{Birth, Desk, Device};
+use firmware::device::{Birth, Desk, Device, RETRY_US};
 use firmware::drive::{Ports, step};
 use firmware::memory::{Small, Storage};
 use firmware::ports::{
@@ -17,7 +17,9 @@ use oracle::camera::Time;
 use oracle::wire::{Lists, check, model};
 use shared::camera::PairModel;
 use shared::stage::warp::knots;
-use shared::wire::{Decoder, Frame, MAX_FRAME, PairReport, ResetReason, ToDevice, ToHost};
+use shared::wire::{
+    Decoder, Frame, Health, MAX_FRAME, PairReport, PictureKind, ResetReason, ToDevice, ToHost,
+};
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;
@@ -214,17 +216,21 @@ fuzz_target!(|input: (Option<&[u8]>, Vec<Happening<'_>>)| {
             watchdog: outside(),
         };
         let mut decoder = Decoder::new(frame);
-        // Let it do so many things; whether it says hello.
+        let told = RefCell::new(Told::default());
+        // Let it do so many things, and hear what it says.
         let mut steps = |count: usize, time: &mut Time| {
-            let mut greeted = false;
             for _ in 0..count {
                 let _ = step(&mut device, &mut ports);
                 time.delay_us(100);
                 for byte in world.borrow_mut().sent.drain(..) {
-                    greeted |= decoder.push(byte).is_some_and(|frame| is_hello(&frame, lists));
+                    if let Some(frame) = decoder.push(byte) {
+                        told.borrow_mut().take(&frame, lists);
+                    }
                 }
             }
-            greeted
+        };
+        let order = |commands: &[ToDevice]| {
+            world.borrow_mut().bytes.extend(commands.iter().flat_map(oracle::wire::command_bytes));
         };
         steps(4, &mut time);
         // More are but slow.
@@ -235,23 +241,48 @@ fuzz_target!(|input: (Option<&[u8]>, Vec<Happening<'_>>)| {
         {
             let mut world = world.borrow_mut();
             *world = World { picture: std::mem::take(&mut world.picture), ..World::default() };
-            world.bytes.extend(oracle::wire::command_bytes(&ToDevice::Hello));
         }
-        assert!((0..200).any(|_| steps(1, &mut time)), "it says who it is, whatever happened");
+        told.borrow_mut().greeted = false;
+        order(&[ToDevice::Hello]);
+        let says_hello = (0..200).any(|_| {
+            steps(1, &mut time);
+            told.borrow().greeted
+        });
+        assert!(says_hello, "it says who it is, whatever happened");
+        // Its eyes are well again, and a pair of pictures is the last that is begun.
+        time.delay_us(RETRY_US as u32);
+        steps(12, &mut time);
+        order(&[ToDevice::Stop, ToDevice::Grab(PictureKind::Grey)]);
+        steps(100, &mut time);
+        order(&[ToDevice::Health]);
+        steps(12, &mut time);
+        let told = told.borrow();
+        let health = told.health.expect("it says how it fares");
+        assert_eq!(Some(health.pairs + health.dropped), told.shown, "{health:?}");
         let counters = decoder.counters();
         assert_eq!((counters.rejected_frames(), counters.rejected_bytes), (0, 0));
     });
 });
 
-/// Whether a frame is a hello; it is a message at least.
-fn is_hello(frame: &Frame<'_>, lists: &mut Lists) -> bool {
-    match ToHost::decode(frame, &mut lists.lend()).expect("a device sends messages") {
-        ToHost::Hello(_) => true,
-        ToHost::Pair(PairReport { result: Ok(shape), .. }) => {
-            check(shape);
-            false
+/// What a device said.
+#[derive(Default)]
+struct Told {
+    greeted: bool,
+    health: Option<Health>,
+    /// The last pair that was shown.
+    shown: Option<u32>,
+}
+
+impl Told {
+    /// A frame has come, which is a message at least.
+    fn take(&mut self, frame: &Frame<'_>, lists: &mut Lists) {
+        match ToHost::decode(frame, &mut lists.lend()).expect("a device sends messages") {
+            ToHost::Hello(_) => self.greeted = true,
+            ToHost::Health(health) => self.health = Some(health),
+            ToHost::Picture(part) => self.shown = Some(part.pair),
+            ToHost::Pair(PairReport { result: Ok(shape), .. }) => check(shape),
+            _ => {}
         }
-        _ => false,
     }
 }
 

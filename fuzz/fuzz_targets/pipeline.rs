@@ -117,7 +117,7 @@ fuzz_target!(|case: Case| {
         assert!(!matches!(answer, Err(Finding::Capacity(_))), "there is room: {answer:?}");
         let Ok(outcome) = answer else { return };
         let (one, other) = (first.lend(), second.lend());
-        agree(&one, &other);
+        agree(&one, &other, Size { width, height }.words());
         if case.choice.paper.is_none() || case.choice.device {
             survive(Shape::of(&one, &outcome), inbox, frame);
         }
@@ -139,12 +139,17 @@ fn moved(left: &[u8], width: usize, shift: usize, own: Option<&Figure>) -> Vec<u
     right
 }
 
-fn agree(one: &Memory<'_>, other: &Memory<'_>) {
+/// Whether two runs left the same, in masks of so many words.
+fn agree(one: &Memory<'_>, other: &Memory<'_>, words: usize) {
     for (a, b) in one.eyes.iter().zip(&other.eyes) {
+        assert!(a.mask[..words] == b.mask[..words]);
+        assert!(a.graph.nodes == b.graph.nodes && a.graph.edges == b.graph.edges);
+        assert!(a.graph.path == b.graph.path && a.graph.members == b.graph.members);
         assert!(a.contour == b.contour && a.loops == b.loops && a.hull == b.hull);
         assert!(a.samples == b.samples && a.branches == b.branches && a.controls == b.controls);
     }
     assert!(one.matches == other.matches && one.balls == other.balls && one.depths == other.depths);
+    assert!(one.boundary_pairs == other.boundary_pairs && one.skeleton_pairs == other.skeleton_pairs);
 }
 
 /// Write a shape and read it back.

@@ -54,6 +54,7 @@ const fn div_long(n: u64, d: u64) -> u64 {
     if d >> 32 != 0 || n >> 32 >= d {
         return quotient(n, d);
     }
+    // The divisor below 2^32, and n below 2^32 times it: so is n << bits below 2^64.
     let bits = (d as u32).leading_zeros();
     let (n, d) = (n << bits, (d as u32) << bits);
     let (high, rest) = digit((n >> 32) as u32, n as u32 >> 16, d);
@@ -66,11 +67,12 @@ const fn digit(high: u32, next: u32, d: u32) -> (u32, u32) {
     // The highest bit said once more: then the compiler knows that this is no division by 0.
     let (d1, d0) = (d >> 16 | 1 << 15, d & 0xFFFF);
     let (mut q, mut rest) = (high / d1, high % d1);
-    // At most two too large.
+    // At most two too large. Once both have 16 bits, product and rest << 16 | next stay below 2^32.
     while rest >> 16 == 0 && (q >> 16 != 0 || q * d0 > (rest << 16 | next)) {
         q -= 1;
         rest += d1;
     }
+    // Modulo 2^32, which the rest is below.
     (q, (high << 16 | next).wrapping_sub(q.wrapping_mul(d)))
 }
 
@@ -98,6 +100,7 @@ pub const fn isqrt(x: u64) -> u64 {
 
 /// Length of the vector `(a, b)`, in its own unit, rounded down. |a|, |b| < 2^31.
 pub const fn hypot(a: i32, b: i32) -> i32 {
+    // Squares of at most 2^62 each, less than 2^63 together.
     let (a, b) = (a as i64, b as i64);
     saturate(isqrt((a * a + b * b) as u64) as i64)
 }
@@ -115,6 +118,7 @@ pub const fn log2(x: u64) -> i32 {
     let mut log = (whole as i32) << 16;
     let mut bit = 1 << 15;
     while bit > 0 {
+        // 2^30 <= m < 2^31: the square is below 2^62, and below 2^32 when shifted.
         m = ((m as u64 * m as u64) >> 30) as u32;
         if m >= 2 << 30 {
             m >>= 1;

@@ -45,6 +45,7 @@ impl PixelPoint {
 
     /// The point a fraction `num / den` of the way to `other`.
     pub const fn lerp(self, other: Self, num: i32, den: i32) -> Self {
+        // Differences below 2^21, products below 2^52.
         Self {
             u: self.u + div_round((other.u - self.u) as i64 * num as i64, den as i64) as i32,
             v: self.v + div_round((other.v - self.v) as i64 * num as i64, den as i64) as i32,
@@ -80,6 +81,7 @@ impl Direction {
         if length == 0 {
             return None;
         }
+        // |x| < 2^30: the product is below 2^44.
         let part = |x: i32| {
             div_round(i64::from(x) * i64::from(UNIT), length).clamp(-UNIT as i64, UNIT as i64) as i16
         };
@@ -100,12 +102,14 @@ impl Direction {
     pub fn turned(self, sine: i32) -> Self {
         let sine = sine.clamp(-UNIT, UNIT);
         let cosine = ((UNIT * UNIT - sine * sine) as u32).isqrt() as i32;
+        // Four factors of at most 2^14: sums of at most 2^29.
         let (u, v) = (i32::from(self.u), i32::from(self.v));
         Self::of((u * cosine - v * sine) >> 14, (u * sine + v * cosine) >> 14).unwrap_or(self)
     }
 
     /// Component along this direction of the vector from `a` to `b`, 1/256 px.
     pub const fn along(self, a: PixelPoint, b: PixelPoint) -> i32 {
+        // Each product below 2^35; the component, of a vector shorter than 2^21.5, below 2^22.
         ((self.u as i64 * (b.u - a.u) as i64 + self.v as i64 * (b.v - a.v) as i64) >> 14) as i32
     }
 

@@ -430,22 +430,77 @@ fn eyes_that_hang_are_started_again() {
         assert!(bench.report().result.is_ok());
     }
     let health = bench.health();
-    assert_eq!((health.timeouts, health.restarts, health.dropped), (1, 1, 0));
+    assert_eq!((health.timeouts, health.restarts, health.dropped), (1, 1, 1));
     // A bad frame is but dropped; several in a row are more than bad luck.
     world.borrow_mut().faults.push_back(CameraFault::Length(3));
     bench.report();
     bench.report();
-    assert_eq!((bench.health().restarts, bench.health().dropped), (1, 1));
+    assert_eq!((bench.health().restarts, bench.health().dropped), (1, 2));
     world.borrow_mut().faults.extend([CameraFault::PictureBus; 3]);
     bench.report();
     bench.report();
-    assert_eq!((bench.health().restarts, bench.health().dropped), (2, 4));
+    assert_eq!((bench.health().restarts, bench.health().dropped), (2, 5));
     // A picture that breaks off is no picture.
     world.borrow_mut().read_breaks = Some(100);
     bench.report();
     bench.report();
-    assert_eq!((bench.health().restarts, bench.health().dropped), (2, 5));
+    assert_eq!((bench.health().restarts, bench.health().dropped), (2, 6));
     assert_eq!(world.borrow().starts, 3);
+    assert_eq!(dropped(&mut bench), 6);
+}
+
+/// How many pairs were dropped, by a device that is stopped: with those that came to their end they are all that were
+/// begun, of which the pictures that are asked for at last have the number.
+#[track_caller]
+fn dropped(bench: &mut Bench<Eyes>) -> u32 {
+    assert_eq!(bench.ask(&ToDevice::Stop), Ok(()));
+    assert_eq!(bench.ask(&ToDevice::Grab(PictureKind::Grey)), Ok(()));
+    bench.pictures(PictureKind::Grey);
+    let pair = |heard: &Heard| if let Heard::Rows(pair, ..) = heard { Some(*pair) } else { None };
+    let begun = bench.heard.iter().rev().find_map(pair).unwrap();
+    let health = bench.health();
+    assert_eq!(health.pairs + health.dropped, begun, "{health:?}");
+    health.dropped
+}
+
+/// A device in the middle of a pair, after one that it described.
+fn under_way() -> (Bench<Eyes>, Shared<World>) {
+    let (mut bench, world) = running(scenes(Solid::Capsule), plain());
+    bench.report();
+    while world.borrow().read.len() % 2 == 0 {
+        let _ = bench.step();
+    }
+    (bench, world)
+}
+
+#[test]
+fn a_pair_that_a_stop_ends_is_dropped() {
+    let (mut bench, _) = under_way();
+    assert_eq!(dropped(&mut bench), 1);
+}
+
+#[test]
+fn a_pair_that_a_new_calibration_ends_is_dropped() {
+    for command in [ToDevice::Calibration(plain()), ToDevice::ForgetCalibration] {
+        let (mut bench, _) = under_way();
+        assert_eq!(bench.ask(&command), Ok(()));
+        assert_eq!(bench.health().dropped, 1);
+        assert!((1..=2).contains(&dropped(&mut bench)), "one more by the stop, if one was under way");
+    }
+}
+
+#[test]
+fn a_pair_that_a_lost_part_of_its_pictures_ends_is_dropped() {
+    let (mut bench, _) = under_way();
+    assert_eq!(bench.ask(&ToDevice::Grab(PictureKind::Grey)), Ok(()));
+    bench.until(|heard| matches!(heard, Heard::Rows(..)).then_some(()));
+    bench.cable.borrow_mut().jam = Some(LinkError::Closed);
+    while bench.cable.borrow().lost == 0 {
+        let _ = bench.step();
+    }
+    bench.cable.borrow_mut().jam = None;
+    assert_eq!(bench.health().dropped, 1);
+    assert!((1..=2).contains(&dropped(&mut bench)), "one more by the stop, if one was under way");
 }
 
 #[test]

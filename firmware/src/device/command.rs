@@ -51,7 +51,7 @@ impl Device<'_> {
             Ok(ToDevice::ForgetCalibration) => return self.outbox.waiting = Waiting::Record(0, number),
             Ok(ToDevice::Start) => self.start(),
             Ok(ToDevice::Stop) => {
-                self.job = None;
+                self.abandon();
                 (self.orders.running, self.orders.grab) = (false, None);
                 Ok(())
             }

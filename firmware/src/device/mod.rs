@@ -260,7 +260,10 @@ impl<'m> Device<'m> {
                 self.outbox.waiting = Waiting::Nothing;
                 if result.is_err() {
                     // Whoever misses a part of a picture asks for it again; the rest is of no use.
-                    self.job.take_if(|job| job.grab.is_some());
+                    if let Some(Job { grab: grab @ Some(_), .. }) = &mut self.job {
+                        *grab = None;
+                        self.abandon();
+                    }
                 }
             }
             Event::Started(Ok(identities)) => {
@@ -279,7 +282,7 @@ impl<'m> Device<'m> {
                 }
             }
             Event::Exposed(Err(_)) => self.stop_eyes(),
-            Event::Captured(Ok(stamps)) => self.begin(stamps),
+            Event::Captured(Ok(stamps)) => self.captured(stamps),
             Event::Read(Ok(())) => self.read(),
             Event::Captured(Err(error)) | Event::Read(Err(error)) => self.fault(error.fault),
         }
@@ -290,10 +293,12 @@ impl<'m> Device<'m> {
         self.starts = self.starts.saturating_add(1);
     }
 
-    /// Let go of the pair under way. Pictures asked for are the next one's.
+    /// Let go of the pair under way, if there is one: no pair that was begun ends in another way than here or by
+    /// its conclusion. Pictures asked for are the next one's.
     fn abandon(&mut self) {
-        let grab = self.job.take().and_then(|job| job.grab);
-        self.orders.grab = self.orders.grab.or(grab);
+        let Some(job) = self.job.take() else { return };
+        self.health.dropped = self.health.dropped.saturating_add(1);
+        self.orders.grab = self.orders.grab.or(job.grab);
     }
 
     /// Let the eyes be started again.
@@ -305,12 +310,9 @@ impl<'m> Device<'m> {
     /// A pair is lost.
     fn fault(&mut self, fault: CameraFault) {
         self.abandon();
-        let counter = match fault {
-            CameraFault::TimeLimit(_) => &mut self.health.timeouts,
-            _ => &mut self.health.dropped,
-        };
-        *counter = counter.saturating_add(1);
-        let hopeless = matches!(fault, CameraFault::TimeLimit(_) | CameraFault::NotStarted);
+        let late = matches!(fault, CameraFault::TimeLimit(_));
+        self.health.timeouts = self.health.timeouts.saturating_add(late.into());
+        let hopeless = late || fault == CameraFault::NotStarted;
         if let Eyes::Up { faults, .. } = &mut self.eyes {
             *faults += 1;
             if hopeless || *faults >= PATIENCE {

@@ -26,6 +26,8 @@ const PART: usize = 3840;
 /// What is done next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Step {
+    /// Take a picture with both eyes.
+    Capture,
     /// Fetch an eye's picture.
     Fetch(Side),
     /// Find the object.
@@ -132,16 +134,17 @@ impl Device<'_> {
     /// The next step of the pair under way, or the first of a new one if one is wanted.
     pub(super) fn go_on(&mut self) -> Decision {
         let Eyes::Up { exposure, .. } = self.eyes else { return Decision::Rest };
-        let Some(mut job) = self.job.take() else {
-            return if !self.orders.running && self.orders.grab.is_none() {
-                Decision::Rest
-            } else if exposure == self.control.exposure() {
-                Decision::Capture
-            } else {
-                Decision::Expose
-            };
+        let mut job = match self.job.take() {
+            Some(job) => job,
+            None if !self.orders.running && self.orders.grab.is_none() => return Decision::Rest,
+            None if exposure != self.control.exposure() => return Decision::Expose,
+            None => self.begin(exposure),
         };
         let next = match job.step {
+            Step::Capture => {
+                self.job = Some(job);
+                return Decision::Capture;
+            }
             Step::Fetch(side) => {
                 self.meter.clear();
                 self.job = Some(job);
@@ -173,9 +176,8 @@ impl Device<'_> {
         Decision::Out
     }
 
-    /// Both eyes hold a picture.
-    pub(super) fn begin(&mut self, stamps: Stamps) {
-        let Eyes::Up { exposure, .. } = self.eyes else { return };
+    /// A pair with a number of its own, of eyes with this exposure.
+    fn begin(&mut self, exposure: Exposure) -> Job {
         // Without a calibration only steps of single eyes are gone, to which the optics do not matter.
         let optics = self.calibration.optics().unwrap_or(Optics { focal: PX, disparity_offset: 0 });
         let settings = Settings {
@@ -184,17 +186,24 @@ impl Device<'_> {
             ..Settings::device(optics)
         };
         self.pairs_begun = self.pairs_begun.wrapping_add(1);
-        self.job = Some(Job {
+        Job {
             number: self.pairs_begun,
-            stamps,
+            stamps: Stamps { done: [0; 2] },
             exposure,
             levels: [0; 2],
             described: self.orders.running,
             grab: self.orders.grab.take(),
             run: Run::new(&mut self.memory, &settings),
             refused: None,
-            step: Step::Fetch(Side::Left),
-        });
+            step: Step::Capture,
+        }
+    }
+
+    /// Both eyes hold a picture.
+    pub(super) fn captured(&mut self, stamps: Stamps) {
+        if let Some(job @ Job { step: Step::Capture, .. }) = &mut self.job {
+            (job.stamps, job.step) = (stamps, Step::Fetch(Side::Left));
+        }
     }
 
     /// Take a row of the picture that is fetched.
@@ -283,15 +292,15 @@ impl Device<'_> {
         Ok((end < self.size.height).then_some(end))
     }
 
-    /// Say what became of a pair, if it was to be described or cannot even be looked at.
+    /// A pair has come to its end. Say what became of it, if it was to be described or cannot even be looked at.
     fn conclude(&mut self, job: Job) {
+        let count = |counter: &mut u32| *counter = counter.saturating_add(1);
+        count(&mut self.health.pairs);
         let result = match job.refused {
             Some(finding) => Err(finding),
             None if job.described => job.run.pair(&mut self.memory, &mut ()),
             None => return,
         };
-        let count = |counter: &mut u32| *counter = counter.saturating_add(1);
-        count(&mut self.health.pairs);
         if result.is_err() {
             count(&mut self.health.refused);
         }

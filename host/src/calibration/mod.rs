@@ -195,13 +195,20 @@ impl StereoCamera {
         Self::from_documents(&first, Some(&second))
     }
 
-    /// Writes the pair as OpenCV's `M1 D1 M2 D2 R T`, under a temporary name first, so that the file
-    /// is there whole or not at all. [`Self::read`] gives back the same bits.
+    /// The pair as OpenCV's `M1 D1 M2 D2 R T`, of which [`Self::parse`] gives back the same bits.
     ///
     /// # Errors
     ///
-    /// When the file cannot be written, or when those keys cannot say what the cameras are: fisheye
-    /// lenses, or images of two sizes.
+    /// When those keys cannot say what the cameras are: fisheye lenses, or images of two sizes.
+    pub fn opencv_yaml(&self) -> Result<String, CalibrationError> {
+        opencv::format(self)
+    }
+
+    /// Writes [`Self::opencv_yaml`], under a temporary name first, so that the file is there whole or not at all.
+    ///
+    /// # Errors
+    ///
+    /// Those of the text, and when the file cannot be written.
     pub fn write_opencv_yaml(&self, path: impl AsRef<Path>) -> Result<(), CalibrationError> {
         opencv::write(self, path.as_ref())
     }

@@ -58,7 +58,8 @@ pub(super) fn write(pair: &StereoCamera, path: &Path) -> Result<(), CalibrationE
         .map_err(|source| CalibrationError::Unwritable { path: path.into(), source })
 }
 
-fn format(pair: &StereoCamera) -> Result<String, CalibrationError> {
+/// The pair as text; see [`StereoCamera::opencv_yaml`].
+pub(super) fn format(pair: &StereoCamera) -> Result<String, CalibrationError> {
     let StereoCamera { left, right, rotation, translation } = pair;
     if (left.width, left.height) != (right.width, right.height) {
         return Err(CalibrationError::Inexpressible { reason: "the images of the eyes differ in size" });

@@ -152,6 +152,9 @@ fn info_as_text(hello: &Hello, health: &Health) -> String {
     let up = Duration::from_millis(health.uptime).as_secs_f64();
     table.row("running", &format!("{up:.1} s since {}", reset(hello)));
     table.row("pairs", &format!("{}, {} of them refused", health.pairs, health.refused));
+    if health.dropped > 0 {
+        table.row("dropped", &format!("{} pairs more that were begun", health.dropped));
+    }
     for (name, number) in faults(health) {
         if number > 0 {
             table.row("fault", &format!("{number} {name}"));
@@ -161,9 +164,8 @@ fn info_as_text(hello: &Hello, health: &Health) -> String {
 }
 
 /// What went wrong on the device, and how often.
-fn faults(health: &Health) -> [(&'static str, u32); 7] {
+fn faults(health: &Health) -> [(&'static str, u32); 6] {
     [
-        ("pictures dropped", health.dropped),
         ("pictures late", health.timeouts),
         ("camera restarts", health.restarts),
         ("bytes that were no frame", health.rejected_bytes),

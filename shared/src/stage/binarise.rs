@@ -257,6 +257,7 @@ pub fn otsu(histogram: &Histogram) -> u8 {
     for (value, h) in bins().filter(|(_, h)| *h > 0) {
         n0 += h;
         s0 += u64::from(value) * h;
+        // Products below 2^58, their difference below 2^56.
         let variance = (u128::from((n * s0).abs_diff(n0 * s)).pow(2), n0 * (n - n0));
         if variance.1 > 0 && times(variance.0, best.1) > times(best.0, variance.1) {
             (level, best) = (value, variance);

@@ -53,7 +53,7 @@ pub struct Sample {
 impl Sample {
     fn of(ball: &MedialBall, depth: &BallDepth) -> Self {
         let (PixelPoint { u, v }, rho, d) = (ball.centre, ball.rho, depth.disparity);
-        Self { ball: Ball { u, v, rho, d }, weight: depth.weight * (ONE / UNIT) }
+        Self { ball: Ball { u, v, rho, d }, weight: depth.weight * (ONE / UNIT) } // 2^14 x 2^2
     }
 }
 
@@ -132,6 +132,7 @@ pub fn trace_pixels(
 ) -> Result<(), CapacityError> {
     for pixel in path {
         let PixelPoint { u, v } = pixel.centre();
+        // At most 2^16 x 2^8.
         let rho =
             i32::from(distance.get(i32::from(pixel.u), i32::from(pixel.v))) * PX / i32::from(DISTANCE_PX);
         push(samples, Sample { ball: Ball { u, v, rho, d: 0 }, weight: ONE }, "branch samples")?;
@@ -148,6 +149,7 @@ struct Average {
 
 impl Average {
     fn add(&mut self, weight: i32, Sample { ball: Ball { u, v, rho, d }, weight: trust }: Sample) {
+        // A weight of at most 2^24, values below 2^21: 2^16 balls stay below 2^61.
         let weight = i64::from(weight);
         for (sum, value) in self.sums.iter_mut().zip([u, v, rho, d, trust]) {
             *sum += weight * i64::from(value);
@@ -175,7 +177,7 @@ fn averages(pixels: &[Pixel], balls: &Balls<'_>) -> [Average; TOGETHER] {
         for (average, pixel) in averages.iter_mut().zip(pixels) {
             let near = reach_squared - pixel.centre().distance_squared(ball.centre);
             if near > 0 {
-                // At most 2^18 each; 24 bits of their product are kept, so that 2^16 balls fit.
+                // At most 2^18 each; 24 bits of their product are kept.
                 average.add(((near * near) >> 12) as i32, Sample::of(ball, depth));
             }
         }
@@ -190,7 +192,7 @@ fn continue_tip(start: usize, balls: &Balls<'_>, samples: &mut VecView<Sample>) 
     }
     // From its last ball an object reaches on for at most a few radii: a right angle for 1.4.
     let Some(mut tip) = samples.last().map(|last| last.ball) else { return Ok(()) };
-    let mut left = 2 * tip.rho;
+    let mut left = 2 * tip.rho; // Below 2^22.
     loop {
         let behind = samples.get(start.max(samples.len().saturating_sub(1 + TIP_SPAN))).map(|s| s.ball);
         let direction = behind.and_then(|behind| Direction::of(tip.u - behind.u, tip.v - behind.v));

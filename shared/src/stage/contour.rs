@@ -169,6 +169,7 @@ fn soften(crossings: &mut [EdgeCrossing]) {
     for i in 0..crossings.len() {
         let here = crossings[i].at;
         let after = crossings.get(i + 1).map_or(first, |c| c.at);
+        // Coordinates within 2^20: the sum is within 2^22 + 2.
         let mean = |a: i32, b: i32, c: i32| (a + 2 * b + c + 2) >> 2;
         crossings[i].at =
             PixelPoint { u: mean(before.u, here.u, after.u), v: mean(before.v, here.v, after.v) };
@@ -190,6 +191,7 @@ fn place(grey: Option<Grey<'_>>, mask: &Bitmap<'_>, pixel: (i32, i32), axis: (i3
         let (object, background) = (level(-i32::from(two_inside)), level(1 + i32::from(two_outside)));
         let contrast = object - background;
         if contrast.abs() >= MIN_CONTRAST {
+            // Levels differ by less than 2^8: the product is below 2^16.
             let share = |k: i32| ((level(k) - background) * PX).checked_div(contrast).unwrap_or(0);
             let covered = |k: i32| share(k).clamp(0, PX);
             let beyond = if two_outside { covered(1) } else { 0 };
@@ -197,6 +199,7 @@ fn place(grey: Option<Grey<'_>>, mask: &Bitmap<'_>, pixel: (i32, i32), axis: (i3
             shift = beyond - missing;
         }
     }
+    // From -2^6 to 1.25 px, and half a pixel at the border: no point leaves -2^7..2^20.
     let along = PX / 2 + shift.clamp(-PX * 3 / 4, PX * 3 / 4);
     EdgeCrossing {
         at: PixelPoint { u: pixel.0 * PX + along * axis.0, v: pixel.1 * PX + along * axis.1 },
@@ -216,6 +219,7 @@ fn resample(
     for i in 0..crossings.len() {
         let (here, next) = (crossings[i].at, crossings.get(i + 1).map_or(first, |c| c.at));
         crossings[i].to_next = hypot(next.u - here.u, next.v - here.v) as u16;
+        // At most 2^26 cracks, each less than 2^10 from the next.
         length += i64::from(crossings[i].to_next);
     }
     let len = (length / i64::from(PX)).max(MIN_LOOP as i64);
@@ -258,6 +262,7 @@ pub(crate) fn normal(l: ContourLoop, i: usize, at: impl Fn(usize) -> PixelPoint)
         before = if before == l.start { end - 1 } else { before - 1 };
         after = if after + 1 == end { l.start } else { after + 1 };
         let (a, b) = (at(before), at(after));
+        // Weights of 138 in all, differences below 2^21: below 2^29.
         u += weight * (b.u - a.u);
         v += weight * (b.v - a.v);
     }

@@ -67,6 +67,7 @@ impl CutMatch {
     pub fn margin(&self) -> u32 {
         let others = self.errors.iter().enumerate().filter(|(s, _)| *s != self.shift).map(|(_, e)| *e);
         let second = u64::from(others.min().unwrap_or(0));
+        // Errors have 32 bits: 48 when shifted.
         ((second << 16) / u64::from(self.errors[self.shift].max(1))).min(u64::from(u32::MAX)) as u32
     }
 }
@@ -83,6 +84,7 @@ pub fn match_cuts(left: &[PixelPoint], right: &[PixelPoint]) -> Option<CutMatch>
         let distances: [u64; CUT_VERTICES] =
             core::array::from_fn(|i| feature_distance(&of_left[i], &of_right[(i + s) % CUT_VERTICES]));
         let e_omega = |i| (0..OMEGA).map(|k| distances[(i + k) % CUT_VERTICES]).sum::<u64>();
+        // e_omega is below 2^54, so twelve of them, shifted, are below 2^42.
         let sum: u64 = (0..CUT_VERTICES).map(|i| e_omega(i) >> 16).sum();
         (sum / CUT_VERTICES as u64).min(u64::from(u32::MAX)) as u32
     });
@@ -100,6 +102,7 @@ fn cut(hull: &[PixelPoint]) -> Option<[PixelPoint; CUT_VERTICES]> {
     }
     let mut vertices = [PixelPoint::default(); CUT_VERTICES];
     for (k, height) in CUT_HEIGHTS.iter().enumerate() {
+        // A height of at most 2^21 by a share below 2^16.
         let down = div_round(i64::from(bottom - top) * i64::from(*height), i64::from(ONE)) as i32;
         // Rounding must not reach the bottom of a hull of a tenth of a pixel: nothing crosses that row.
         let v = top + down.min(bottom - top - 1);
@@ -209,7 +212,7 @@ fn triples(n: usize) -> impl Iterator<Item = [usize; 3]> {
     (0..n).flat_map(move |a| (a + 1..n).flat_map(move |b| (b + 1..n).map(move |c| [a, b, c])))
 }
 
-/// Twice the area of a convex polygon.
+/// Twice the area of a convex polygon: its triangles do not overlap, so it is at most 2^43.
 fn doubled_area(hull: &[PixelPoint]) -> i64 {
     hull.windows(2).map(|edge| orient(hull[0], edge[0], edge[1]).abs()).sum()
 }
@@ -228,7 +231,8 @@ fn triple_agrees(
     threshold: i32,
 ) -> bool {
     let (left, right) = doubled_areas(triple, at);
-    // left / areas.0 against right / areas.1, cross-multiplied: below 2^104.
+    // left / areas.0 against right / areas.1, cross-multiplied: areas below 2^44, products below 2^88, 2^104 when
+    // shifted; by a threshold below 2^31, 2^119.
     let (a, b) = (i128::from(left) * i128::from(areas.1), i128::from(right) * i128::from(areas.0));
     a > 0 && b > 0 && (a - b).abs() << 16 < a.max(b) * i128::from(threshold)
 }

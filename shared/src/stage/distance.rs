@@ -36,7 +36,7 @@ pub struct Parabola {
     apex: u16,
     /// First position at which no other parabola is lower, px.
     from: u16,
-    /// Its value at position 0, px^2: the squares of `apex` and of the distance along the column there.
+    /// Its value at position 0, px^2: the squares of `apex` and of the distance along the column there; below 2^25.
     base: u32,
 }
 
@@ -194,6 +194,7 @@ fn along_run(run: &mut [u16], envelope: &mut [Parabola], mut emit: impl FnMut(us
         let from = usize::from(part.from).max(1);
         // From one position to the next a parabola grows by 2 more than before.
         let (apex, x) = (u32::from(part.apex), from as u32);
+        // A sum below 2^26; modulo 2^32 the differences are right, since squares are below 2^24.
         let mut square = (x * x + part.base).wrapping_sub(2 * apex * x);
         let mut growth = (2 * x + 1).wrapping_sub(2 * apex);
         let pixels = run.get_mut(from - 1..until).unwrap_or_default();
@@ -220,9 +221,11 @@ fn lower_envelope(run: &[u16], envelope: &mut [Parabola]) -> usize {
         if least != 0 && least >= x * (end - x) {
             continue;
         }
+        // Positions are at most 2^12 + 1, and what is kept of squares of heights is below 2^23: below 2^25.
         let base = x * x + least;
         // At position y they differ by the difference of their bases, less 2 y for each px between their apexes.
         let mut apart = 2 * (x - u32::from(last.apex));
+        // At most 2^12 x (2^13 + 2), and the base.
         while top > 0 && last.base + u32::from(last.from) * apart > base {
             top -= 1;
             last = envelope.get(top).copied().unwrap_or_default();
@@ -267,6 +270,7 @@ fn root(square: u32) -> u16 {
     }
     let k = (u32::BITS - SMALL.ilog2() - square.leading_zeros()).div_ceil(2);
     let guess = ROOTS.get((square >> (2 * k)) as usize).map_or(1, |root| u32::from(root + 1)) << k;
+    // Below 2^8 x 2^24, and its root below 2^16.
     let square = UNIT * square;
     let root = (guess + square.checked_div(guess).unwrap_or(0)) / 2;
     (root - u32::from(root * root > square)) as u16

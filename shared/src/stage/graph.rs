@@ -217,6 +217,7 @@ impl Graph<'_> {
             self.set_node(i, node);
         }
         for node in self.nodes.iter_mut() {
+            // Below 2^28 x 2^8.
             let mean = |sum: i32| div_round(sum as i64 * PX as i64, node.pixels as i64) as i32;
             node.position = PixelPoint { u: mean(node.position.u), v: mean(node.position.v) };
         }

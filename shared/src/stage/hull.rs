@@ -115,6 +115,7 @@ fn join(points: &mut [PixelPoint], right: usize, left: usize) -> usize {
     length
 }
 
+/// The point, brought to where `orient` is exact: products of differences are then at most 2^42.
 fn point(u: i32, v: i32) -> PixelPoint {
     const LIMIT: i32 = MAX_SIDE as i32 * PX;
     PixelPoint { u: u.clamp(-LIMIT, LIMIT), v: v.clamp(-LIMIT, LIMIT) }

@@ -48,6 +48,7 @@ pub fn feature_vector(polygon: &[PixelPoint], i: usize, measure: Measure) -> Fea
         Measure::Ratio => pairs(areas).map(|(k, l)| ((k.get() << 16) / l).clamp(1 << 8, 1 << 24) as i32),
         Measure::Logarithm => {
             let chord = a.distance(c).max(b.distance(d)).max(a.distance(d));
+            // A chord below 2^22, times 2^7; with an area below 2^45.
             let noise = (i64::from(chord) * VERTEX_NOISE) as u64;
             let logarithms = areas.map(|s| log2(s.get() + noise));
             pairs(logarithms).map(|(k, l)| (k - l).clamp(-8 * ONE, 8 * ONE))
@@ -58,6 +59,7 @@ pub fn feature_vector(polygon: &[PixelPoint], i: usize, measure: Measure) -> Fea
 /// Squared distance of two feature vectors, in 1/2^32.
 pub fn feature_distance(left: &FeatureVector, right: &FeatureVector) -> u64 {
     let square = |d: u32| u64::from(d) * u64::from(d);
+    // Six squares of differences below 2^24: below 2^51.
     left.iter().zip(right).map(|(a, b)| square(a.abs_diff(*b))).sum()
 }
 

@@ -15,7 +15,9 @@
 //! * **Kept** are balls with no contour point more than 0.4 px inside.
 //! * **Cost**: a point begins with its neighbour's contact and looks only at the strips ([`Strips`]) that its disc
 //!   meets, 20 to 50 of any contour; on a circle, where every disc is the same, at all points (decisions/0013).
-//! * **Bounds**: squared lengths below 2^43, radius times dot product below 2^62.
+//! * **Bounds**: squared lengths below 2^43; a disc that nothing has stopped has a radius below 2^27, so twice a radius
+//!   times a height stays below 2^50. A ball's radius is at most the distance of its contacts, below 2^21: a disc
+//!   shrinks to d^2 / 2h only where h >= d / 2.
 
 use crate::arena::{Arena, List};
 use crate::fixed::{PX, UNIT, div_floor};
@@ -30,7 +32,7 @@ use heapless::VecView;
 pub struct MedialBall {
     /// Centre.
     pub centre: PixelPoint,
-    /// Radius, 1/256 px.
+    /// Radius, 1/256 px; below 2^21.
     pub rho: i32,
     /// The two contour points that it touches; the ball was grown from the first.
     pub contacts: [u32; 2],
@@ -117,6 +119,7 @@ impl Touching {
             return Sight::Outside;
         }
         let distance_squared = self.at.distance_squared(q);
+        // Heights are below 2^22, radii below 2^27: products below 2^46 and 2^50.
         let is_aside = 4 * product(height, height) < distance_squared;
         if is_aside && height < LEAST_HEIGHT || distance_squared >= product(2 * self.rho, height) {
             Sight::Outside
@@ -125,7 +128,7 @@ impl Touching {
         } else if height >= 2 * self.rho {
             Sight::Beyond(height / 2)
         } else {
-            // Less than the radius, since the disc reaches over the point.
+            // Less than the radius, since the disc reaches over the point; no more than the distance, see **Bounds**.
             Sight::Shrinks(div_floor(distance_squared as u64, 2 * height as u64) as i32)
         }
     }
@@ -139,6 +142,7 @@ impl Touching {
     }
 
     fn centre(&self) -> PixelPoint {
+        // A radius below 2^27 by at most 2^14: within 2^27, so that the centre is within 2^28.
         let offset = |n: i16| ((product(self.rho, n.into()) + (1 << 13)) >> 14) as i32;
         PixelPoint { u: self.at.u + offset(self.inward.u), v: self.at.v + offset(self.inward.v) }
     }

@@ -41,6 +41,7 @@ pub fn pair_nearest<R: Iterator<Item = PixelPoint>>(
     let Some(mut nearest) = points.first() else { return Ok(()) };
     for left in left {
         // The last partner is near this one; one just as far away may come before it.
+        // Within 2^30 + 2^21 of the origin: squares below 2^61 each, their root below 2^31.
         let centre = map.apply(left);
         let mut least = centre.distance_squared(*nearest) + 1;
         let disc = |squared: i64| Disc { centre, radius: isqrt(squared.cast_unsigned()) as i32 + 1 };

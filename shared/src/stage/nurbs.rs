@@ -135,7 +135,7 @@ impl<'a> Nurbs<'a> {
             let (place, count) = (first + k, self.controls.len());
             let place = if place < count { place } else { place - count };
             let control = self.controls.get(place).copied().unwrap_or_default();
-            // At most 2^30 x 2^20 / 2^16; times a coordinate below 2^54.
+            // At most 2^30 x 2^20 / 2^16; times a coordinate 2^54, as are all four, since basis functions add up to 1.
             let weight = (value as i64 * control.weight.clamp(1, 16 * ONE) as i64) >> 16;
             share += weight;
             for (sum, channel) in sums.iter_mut().zip(control.ball.bounded()) {
@@ -157,6 +157,7 @@ impl<'a> Nurbs<'a> {
         let chord_count = self.end() / (ONE / CHORDS);
         let chord_at =
             |k: i32| chord(self.evaluate(k * (ONE / CHORDS)), self.evaluate((k + 1) * (ONE / CHORDS)));
+        // At most 2^13 chords below 2^30; and no curve is longer than its polygon, 2^9 x 2^30.
         let length: i64 = (0..chord_count).map(chord_at).sum();
         let pieces = div_round(length, (step.max(1) as i64) << ARC_BITS).max((length > 0) as i64);
         take(self.evaluate(0))?;
@@ -168,6 +169,7 @@ impl<'a> Nurbs<'a> {
                 k += 1;
                 across = chord_at(k);
             }
+            // Below 2^30 x 2^12.
             let beyond = div_round((target - start) * (ONE / CHORDS) as i64, across);
             take(self.evaluate(k * (ONE / CHORDS) + beyond as i32))?;
         }
@@ -254,7 +256,7 @@ fn accumulate(
         let (channels, weight) = line.at(part(line.length, i, pieces), &mut cursor);
         let is_end = !closed && (i == 0 || i == pieces);
         let weight = if is_end { weight * end_weight } else { weight };
-        let t = div_round(((spans as i64) << 16) * i, pieces) as i32;
+        let t = div_round(((spans as i64) << 16) * i, pieces) as i32; // 2^9 x 2^16 x 2^16
         let (first, basis) = basis(spans, closed, t);
         if first != gathered.first {
             gathered.give(matrix, sides);
@@ -263,10 +265,11 @@ fn accumulate(
         let mut entries = gathered.entries.iter_mut();
         for a in 0..=DEGREE {
             for (b, entry) in (0..=a).zip(&mut entries) {
+                // At most 2^30, times a weight below 2^23; up to 2^16 samples of 2^37.
                 let product = (i64::from(basis[a]) * i64::from(basis[b])) >> BASIS_BITS;
                 *entry += (product * weight) >> 16;
             }
-            // Below 2^37, times a difference of channels below 2^26.
+            // At most 100 x 2^30, times a difference of channels of at most 2^25: below 2^62.
             let weighted = (i64::from(basis[a]) * weight) >> 16;
             for c in 0..4 {
                 let term = weighted * (channels[c] - (origin[c] << FINE_BITS));
@@ -275,6 +278,7 @@ fn accumulate(
         }
     }
     gathered.give(matrix, sides);
+    // At most 2^20 x 2^14, and 4 times as much.
     let penalty = smoothing << (BASIS_BITS - 16);
     for k in 0..if closed { count } else { count - 2 } {
         let stencil = [(k, 1), ((k + 1) % count, -2), ((k + 2) % count, 1)];
@@ -346,7 +350,7 @@ fn basis(spans: usize, closed: bool, t: i32) -> (usize, [i32; 4]) {
     (span as usize, values)
 }
 
-/// `length * i / pieces`, rounded down, for 0 <= i <= pieces, without the large product.
+/// `length * i / pieces`, rounded down, for 0 <= i <= pieces < 2^32, without the large product.
 const fn part(length: i64, i: i64, pieces: i64) -> i64 {
     let (length, i, pieces) = (length as u64, i as u64, pieces as u64);
     let whole = div_floor(length, pieces);
@@ -358,6 +362,7 @@ fn chord(a: Ball, b: Ball) -> i64 {
     let ([au, av, ..], [bu, bv, ..]) = (a.bounded(), b.bounded());
     let square = (au - bu) * (au - bu) + (av - bv) * (av - bv);
     // One bit more, to round: lengths rounded down would add up to a drift.
+    // Differences of at most 2^21: a square of at most 2^43, 2^61 when shifted.
     (((square as u64) << (2 * ARC_BITS + 2)).isqrt() as i64 + 1) / 2
 }
 
@@ -407,6 +412,7 @@ impl<'a> Polyline<'a> {
         let across = cursor.across;
         let beyond = (arc - cursor.start).min(across);
         let (a, b) = self.ends(cursor.segment);
+        // Channels differ by at most 2^25, weights by less: times an arc below 2^30.
         let between = |a: i64, b: i64| a + div_round((b - a) * beyond, across);
         let mut channels = a.ball.bounded();
         for (channel, end) in channels.iter_mut().zip(b.ball.bounded()) {

@@ -45,6 +45,7 @@ const PX2: i128 = 1 << 16;
 impl ImagePlane {
     /// The value at a point, 1/256 px.
     pub const fn at(&self, p: PixelPoint) -> i32 {
+        // Slopes of at most 2^24, distances below 2^21: products below 2^45, the rise of both below 2^30.
         let rise = self.slope_u as i64 * (p.u - self.origin.u) as i64
             + self.slope_v as i64 * (p.v - self.origin.v) as i64;
         saturate(self.level as i64 + ((rise + (ONE as i64 / 2)) >> 16))
@@ -143,6 +144,7 @@ impl Sums {
         if determinant <= 0 {
             return Some(ImagePlane { origin, level, ..ImagePlane::default() });
         }
+        // Values vary by at most 2^26 times the ridge, so covariances with them are below 2^53, numerators below 2^94.
         let slope = |n: i128| ((n << 16) / determinant).clamp(-(1 << 24), 1 << 24) as i32;
         Some(ImagePlane {
             origin,

@@ -177,6 +177,7 @@ fn score(skeleton: &Bitmap<'_>, distance: &Plane<'_, u16>, rule: Pruning, end: P
     let junction = walk().last().filter(|&p| link_count(skeleton, p) > 2)?;
     let radius = |p: Pixel| distance.get(p.u as i32, p.v as i32) as i64 * (PX as i64 / 16);
     let far = |p: Pixel| junction.centre().distance(p.centre()) as i64;
+    // Radii and distances are below 2^21, steps below 2^9: 2^31 a pixel, 2^55 a branch of 2^24.
     let score = match rule {
         Pruning::None => 0,
         Pruning::Protrusion { .. } => far(end) + radius(end) - radius(junction),

@@ -131,6 +131,7 @@ pub fn row_crossings<'a>(
     each_crossing(points, loops, offset, rows, |i, [a, b], v| {
         let Some(slot) = first.get_mut(v as usize) else { return };
         if let Some(place) = crossings.get_mut(*slot as usize) {
+            // Within a segment: below 2^21 each, as is its width.
             let (run, rise) = (v * PX + offset - a.v, b.v - a.v);
             let u = a.u + div_round(i64::from(b.u - a.u) * i64::from(run), rise.into()) as i32;
             *place = RowCrossing { u, index: i as u32, v: v as u16, heading: rise.signum() as i16 };
@@ -272,6 +273,7 @@ pub fn match_rows(
         let found = matches.get(l.range()).unwrap_or_default();
         for ((i, p), m) in l.range().zip(points).zip(found).filter(|(_, m)| m.weight > 0) {
             let turn = p.normal.cross(m.normal_right).clamp(-MAX_TURN, MAX_TURN);
+            // Within 2^16 at the crossing, which is less than 2^11 away along slopes of at most 2^8: below 2^20 + 2^17.
             let excess = m.disparity - plane.at(p.at);
             trusted.push(Trusted { index: i as u32, excess, turn, weight: m.weight.into() })?;
         }
@@ -286,6 +288,7 @@ fn skip_cost(points: &[ContourPoint]) -> i32 {
     let span = |of: fn(&ContourPoint) -> i32| {
         points.iter().map(of).max().unwrap_or(0) - points.iter().map(of).min().unwrap_or(0)
     };
+    // Spans of at most 2^20 each: a cost of at most 2^15.
     ((span(|p| p.at.u) + span(|p| p.at.v)) / (2 * SKIP_SHARE)).max(LEAST_SKIP)
 }
 
@@ -301,7 +304,8 @@ enum Step {
 type Steps = [[Step; ROW_CROSSINGS + 1]; ROW_CROSSINGS + 1];
 
 /// Align two rows of crossings in order at the least cost, and report the pairs; `skip` is the cost of
-/// leaving one out. What is in `steps` does not matter: clearing it would cost more than a common row.
+/// leaving one out. It takes at most 2^7 of these: sums stay below 2^22, and with a distance from the plane, below
+/// 2^30 + 2^23, within an `i32`. What is in `steps` does not matter: clearing it would cost more than a common row.
 fn align(
     (a, b): (&[RowCrossing], &[RowCrossing]),
     plane: &ImagePlane,
@@ -323,6 +327,8 @@ fn align(
             if cost[j] + skip < best {
                 (best, step) = (cost[j] + skip, Step::SkipRight);
             }
+            // Both could be left out instead, so a pair that is made costs at most 2 skip, 2^16: within that its
+            // disparity is the plane's at its place.
             let together = diagonal + (y.u - expected).abs();
             if x.heading == y.heading && together <= best {
                 (best, step) = (together, Step::Pair);
@@ -414,6 +420,7 @@ fn averaged(l: ContourLoop, trusted: &[Trusted], k: usize) -> (i32, i32) {
         let Some(t) = trusted.get((k + n + w - reach) % around) else { continue };
         let ahead = l.ahead(here.index as usize, t.index as usize);
         let apart = ahead.min(l.len - ahead);
+        // At most 2^14 x 4, times an excess below 2^21; seven of them.
         let weight = i64::from(t.weight) * (AVERAGE_REACH + 1).saturating_sub(apart) as i64;
         excess += weight * i64::from(t.excess);
         turn += weight * i64::from(t.turn);
@@ -441,6 +448,7 @@ fn fill(
         };
         for s in 1..=gap {
             let i = l.step(from, s as isize);
+            // A difference below 2^22, by a gap of at most 2^28 points.
             let mix = |a: i32, b: i32| a + div_round(i64::from(b - a) * s as i64, gap as i64) as i32;
             let (Some(here), Some(point)) = (matches.get_mut(i), left.get(i)) else { continue };
             here.disparity = plane.at(point.at) + mix(behind.0, ahead.0);

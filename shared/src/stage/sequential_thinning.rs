@@ -126,6 +126,7 @@ fn sort_by_distance<'o>(
         values.iter().for_each(|d| count(*d, 1));
         count(0, all - values.len());
     }
+    // Pixels in all: at most 2^24.
     let mut start = 0;
     for entry in next.iter_mut() {
         start += core::mem::replace(entry, start);

@@ -178,5 +178,6 @@ fn grey_at(raw: Grey<'_>, [x, y]: Place) -> u8 {
         mix(u32::from(here), u32::from(row.get(u + 1).copied().unwrap_or(here)), right)
     };
     let sum = mix(along(raw.row(v)), along(raw.row((v + 1).min(height.saturating_sub(1)))), below);
+    // Below 2^8 x 2^8 x 2^8.
     ((sum + (1 << 15)) >> 16) as u8
 }

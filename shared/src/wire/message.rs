@@ -82,13 +82,13 @@ impl PairReport<'_> {
 pub struct Health {
     /// Time since it started, ms.
     pub uptime: u64,
-    /// Pairs that went through the core.
+    /// Pairs that came to their end: described, refused, or shown and no more.
     pub pairs: u32,
-    /// Those that it refused.
+    /// Those that the core refused.
     pub refused: u32,
-    /// Pictures that were dropped before.
+    /// Pairs that were begun and did not come to it. With `pairs`, and one under way, they make the newest number.
     pub dropped: u32,
-    /// Pictures that did not come in time.
+    /// Times that a picture did not come in time; its pair was dropped.
     pub timeouts: u32,
     /// Times that a camera was started anew.
     pub restarts: u32,

@@ -7,14 +7,15 @@ use std::io::{Read, Write};
 use std::net::Shutdown;
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Types of messages: a hello, a pair.
+/// Types of messages: a hello, a pair, a part of a picture.
 const HELLO: u8 = 1;
 const PAIR: u8 = 2;
+const PICTURE: u8 = 3;
 /// A frame is hit once in so many, commands once in so many reads, and the connection ends once in so many frames.
 const HIT: u64 = 12;
 const HIT_COMMAND: u64 = 6;
@@ -31,10 +32,12 @@ pub(crate) enum Fate {
     Unheard,
 }
 
+#[derive(Default)]
 struct State {
     bad: AtomicBool,
     host: Mutex<Host>,
     fates: Mutex<BTreeMap<u64, Fate>>,
+    newest: AtomicU64,
 }
 
 /// The host's end.
@@ -58,8 +61,7 @@ impl Proxy {
             }
             thread::sleep(Duration::from_millis(20));
         };
-        let state = State { bad: AtomicBool::new(false), host: Mutex::default(), fates: Mutex::default() };
-        let state = Arc::new(state);
+        let state = Arc::<State>::default();
         let listener = UnixListener::bind(port).expect("a socket");
         let (up, down) = (Arc::clone(&state), Arc::clone(&state));
         let commands = device.try_clone().expect("a second end");
@@ -76,6 +78,11 @@ impl Proxy {
     /// What became of each pair that the device sent.
     pub(crate) fn fates(&self) -> BTreeMap<u64, Fate> {
         self.0.fates.lock().expect("whole").clone()
+    }
+
+    /// Number of the newest pair of which the device sent anything.
+    pub(crate) fn newest(&self) -> u64 {
+        self.0.newest.load(Ordering::Relaxed)
     }
 }
 
@@ -121,9 +128,13 @@ impl State {
             (false, true) => Fate::Whole,
             (false, false) => Fate::Unheard,
         };
-        if let Some((PAIR, _, payload)) = &message {
+        if let Some((kind @ (PAIR | PICTURE), _, payload)) = &message {
             let number = payload.first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes).into());
-            self.fates.lock().expect("whole").insert(number, fate);
+            self.newest.fetch_max(number, Ordering::Relaxed);
+            if *kind == PAIR {
+                let before = self.fates.lock().expect("whole").insert(number, fate);
+                assert_eq!(before, None, "pair {number} is sent twice");
+            }
         }
     }
 
