@@ -12,7 +12,8 @@
 //! Lengths are millimetres in the left camera's axes. Everything is made in a temporary folder inside the
 //! target and moved only when all of it is complete; when something fails before that, the target is left
 //! as it was. Files are moved one after the other: if the system refuses one of these moves, or the run is killed
-//! between them, those before it are new and the rest old. A page and pictures of an earlier run that this one did
+//! between them, those before it are new and the rest old. The disk is not waited for, so after a power loss the newest
+//! files may be missing or empty (`host/src/unfinished.rs`). A page and pictures of an earlier run that this one did
 //! not make are removed, so that a folder speaks of one run, and all of them when a pair is refused (`clear`); files
 //! of other names are not touched.
 
@@ -195,11 +196,7 @@ impl Stage<'_> {
         name: &str,
         write: impl FnOnce(&Path) -> Result<(), ExportError>,
     ) -> Result<(), ExportError> {
-        let path = self.folder.join(name);
-        write(&self.staged.join(name)).map_err(|error| match error {
-            ExportError::Io { source, .. } => ExportError::Io { path, source },
-            ExportError::Content { what, .. } => ExportError::Content { path, what },
-        })
+        write(&self.staged.join(name)).map_err(|error| error.of(&self.folder.join(name)))
     }
 
     fn bytes(&self, name: &str, bytes: &[u8]) -> Result<String, ExportError> {

@@ -52,6 +52,7 @@ pub(super) fn write(pair: &StereoCamera, path: &Path) -> Result<(), CalibrationE
     unfinished::beside(path)
         .and_then(|mut file| {
             file.write_all(text.as_bytes())?;
+            file.as_file().sync_all()?;
             file.persist(path)?;
             Ok(())
         })

@@ -196,6 +196,14 @@ fn what_is_written_is_read_back_to_the_bit() {
     assert_eq!(std::fs::read_dir(file.path()).expect("list").count(), 1);
 }
 
+/// The sentence that a pair of texts is refused with.
+fn ros_refusal(left: &str, right: &str) -> String {
+    let folder = tempfile::tempdir().expect("folder");
+    std::fs::write(folder.path().join("left.yaml"), left).expect("left");
+    std::fs::write(folder.path().join("right.yaml"), right).expect("right");
+    crate::command::words_of(&StereoCamera::read(folder.path()).expect_err("should be refused"))
+}
+
 #[test]
 fn a_number_that_is_not_finite_is_refused_with_its_key_and_line() {
     for bad in [".Nan", ".NaN", "nan", ".Inf", "-.Inf", "inf", "1e999"] {
@@ -208,6 +216,10 @@ fn a_number_that_is_not_finite_is_refused_with_its_key_and_line() {
             refusal(&OPENCV.replace("240.,", &format!("{bad},"))).starts_with("calibration line 20: `M2`")
         );
         assert!(refusal(&KALIBR.replace("-0.06", bad)).starts_with("calibration line 11: `T_cn_cnm1`"));
+        let left = ros_refusal(&ROS_LEFT.replace("751.0", bad), &ros_right());
+        assert!(left.contains("left.yaml line 7: `camera_matrix` holds"), "{bad}: {left}");
+        let right = ros_refusal(ROS_LEFT, &ros_right().replace("-42.0", bad));
+        assert!(right.contains("right.yaml line 20: `projection_matrix` holds"), "{bad}: {right}");
     }
 }
 

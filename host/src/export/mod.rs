@@ -24,7 +24,7 @@ use thiserror::Error;
 
 use crate::curves::spline::Spline;
 use crate::geometry::Geometry;
-use crate::unfinished;
+use crate::unfinished::{self, Durable};
 
 /// The axes of everything but [`glb`].
 const AXES: &str = "left camera: x right, y down, z forward";
@@ -53,13 +53,28 @@ pub enum ExportError {
     },
 }
 
-/// Writes a geometry in the format that the file's extension names: `ply`, `stl`, `obj`, `glb` or `swc`. Returns
-/// what the format has no place for: the `confidence` of vertices, if they have one.
+impl ExportError {
+    /// The same of a file that was to become `path`.
+    pub(crate) fn of(self, path: &Path) -> Self {
+        let path = path.to_path_buf();
+        match self {
+            Self::Io { source, .. } => Self::Io { path, source },
+            Self::Content { what, .. } => Self::Content { path, what },
+        }
+    }
+}
+
+/// Writes a geometry in the format that the file's extension names: `ply`, `stl`, `obj`, `glb` or `swc`, and waits
+/// until it is on the disk. Returns what the format has no place for: the `confidence` of vertices, if they have one.
 ///
 /// # Errors
 ///
 /// If the extension is none of these, the format cannot hold this geometry, or the file cannot be written.
 pub fn write(path: &Path, geometry: &Geometry) -> Result<Option<&'static str>, ExportError> {
+    durably(path, |hidden| format(hidden, geometry))
+}
+
+fn format(path: &Path, geometry: &Geometry) -> Result<Option<&'static str>, ExportError> {
     let extension = path.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase);
     let refuse = |what: &str| Err(ExportError::Content { path: path.to_path_buf(), what: what.to_owned() });
     let left_out = |confidence: &[f64]| (!confidence.is_empty()).then_some("confidence");
@@ -89,7 +104,7 @@ pub fn write(path: &Path, geometry: &Geometry) -> Result<Option<&'static str>, E
     written.map(|()| None)
 }
 
-/// Writes NURBS, which JSON alone holds with their radii.
+/// Writes NURBS, which JSON alone holds with their radii, and waits until they are on the disk.
 ///
 /// # Errors
 ///
@@ -99,7 +114,15 @@ pub fn write_splines(path: &Path, curves: &[Spline]) -> Result<(), ExportError> 
         let what = "NURBS go into .json alone".to_owned();
         return Err(ExportError::Content { path: path.to_path_buf(), what });
     }
-    json::write_splines(path, curves)
+    durably(path, |hidden| json::write_splines(hidden, curves))
+}
+
+fn durably<T>(path: &Path, write: impl FnOnce(&Path) -> Result<T, ExportError>) -> Result<T, ExportError> {
+    let failed = |source| ExportError::Io { path: path.to_path_buf(), source };
+    let file = Durable::new(path).map_err(failed)?;
+    let written = write(&file.hidden()).map_err(|error| error.of(path))?;
+    file.finish().map_err(failed)?;
+    Ok(written)
 }
 
 /// Whether a file's name ends so, in whatever case.

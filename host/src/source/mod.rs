@@ -4,6 +4,7 @@
 //! grey images of each ([`Pair::load`]). A pair is two files, or one that holds both views ([`Layout`]).
 //! What a user knows about the scene is applied to both views before anything else ([`scene`]).
 
+mod codes;
 pub mod exposure;
 pub mod find;
 mod names;

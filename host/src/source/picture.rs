@@ -5,12 +5,14 @@
 //! user says otherwise. Sizes are held against a limit before any pixel gets memory.
 //!
 //! Decoders of JPEG go on where bytes are damaged, and half a silhouette looks like an object. So a JPEG is
-//! first read strictly; one that fails is refused if it ends too early, and flagged otherwise.
+//! first read strictly, and its codes are held against its header ([`codes`]); one that fails is refused if it ends too
+//! early, and flagged otherwise.
 
 use std::fs;
 use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
 
+use super::codes;
 use image::{DynamicImage, GrayImage, ImageError, ImageFormat, ImageReader, Limits, Luma};
 use shared::limits::MAX_SIDE;
 use zune_jpeg::zune_core::bytestream::ZCursor;
@@ -201,7 +203,7 @@ fn dark(path: &Path, picture: &DynamicImage) -> Option<String> {
     })
 }
 
-/// A warning if a strict decoder stumbles over the file.
+/// A warning if a strict decoder stumbles over the file, or its codes do not come out even.
 fn jpeg_damage(path: &Path, bytes: &[u8]) -> Result<Option<String>, PictureError> {
     let side = MAX_PX as usize;
     let options = DecoderOptions::default().set_strict_mode(true).set_max_width(side).set_max_height(side);
@@ -210,7 +212,13 @@ fn jpeg_damage(path: &Path, bytes: &[u8]) -> Result<Option<String>, PictureError
         // Whether the header is too large or broken, the decoder of all formats will say.
         return Ok(None);
     }
-    let Err(damage) = decoder.decode() else { return Ok(None) };
+    let damage = match decoder.decode() {
+        Err(damage) => damage.to_string(),
+        Ok(_) => match codes::fault(bytes) {
+            Some(fault) => fault.to_string(),
+            None => return Ok(None),
+        },
+    };
     if !bytes.windows(2).rev().take(64).any(|end| end == END_OF_IMAGE) {
         return Err(PictureError::CutShort { path: path.into() });
     }
@@ -223,7 +231,13 @@ fn jpeg_damage(path: &Path, bytes: &[u8]) -> Result<Option<String>, PictureError
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Random;
+    use allocation_counter::measure;
+    use image::codecs::jpeg::JpegEncoder;
     use image::{ImageBuffer, Rgba, RgbaImage};
+
+    const FORMATS: [ImageFormat; 5] =
+        [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::Pnm, ImageFormat::Bmp, ImageFormat::Tiff];
 
     fn bytes_of(image: &DynamicImage, format: ImageFormat) -> Vec<u8> {
         let mut bytes = Cursor::new(Vec::new());
@@ -238,9 +252,9 @@ mod tests {
         load(&path)
     }
 
-    fn disc() -> DynamicImage {
-        let inside = |u: u32, v: u32| (u as i32 - 64).pow(2) + (v as i32 - 64).pow(2) < 1600;
-        GrayImage::from_fn(128, 128, |u, v| Luma([if inside(u, v) { 200 } else { 10 }])).into()
+    /// Of some blocks of a JPEG, and no two pixels alike in a row.
+    fn small() -> DynamicImage {
+        GrayImage::from_fn(24, 16, |u, v| Luma([(u * 9 + v * 3) as u8])).into()
     }
 
     #[test]
@@ -276,35 +290,158 @@ mod tests {
     }
 
     #[test]
-    fn a_file_cut_short_is_refused_at_any_length() {
-        for format in [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::Pnm, ImageFormat::Bmp] {
-            let whole = bytes_of(&disc(), format);
-            assert!(told("whole", &whole).is_ok_and(|loaded| loaded.warnings.is_empty()), "{format:?}");
-            for part in [1, 10, 50, 90, 99] {
-                let cut = &whole[..whole.len() * part / 100];
-                assert!(told("cut", cut).is_err(), "{format:?} at {part} %");
-            }
+    fn a_file_cut_short_at_any_length_is_refused_unless_every_pixel_is_there() {
+        for format in FORMATS {
+            let whole = bytes_of(&small(), format);
+            let image = told("whole", &whole).unwrap().image;
+            let accepted: Vec<usize> = (0..whole.len())
+                .filter(|&length| match told("cut", &whole[..length]) {
+                    Ok(cut) => {
+                        assert!(cut.image == image, "{format:?}: {length} of {} bytes", whole.len());
+                        true
+                    }
+                    Err(_) => false,
+                })
+                .map(|length| whole.len() - length)
+                .collect();
+            // Of a PNG and a TIFF, what comes after the pixels may be missing, and of no other.
+            let is_short = |missing: usize| match format {
+                ImageFormat::Png | ImageFormat::Tiff => missing < 30,
+                _ => false,
+            };
+            assert!(
+                accepted.iter().all(|&missing| is_short(missing)),
+                "{format:?}: without {accepted:?} bytes"
+            );
+        }
+    }
+
+    /// A photograph of a disc, as it were: grey levels change everywhere.
+    fn photograph() -> Vec<u8> {
+        let image = GrayImage::from_fn(320, 240, |u, v| {
+            let inside = (u as i32 - 160).pow(2) + (v as i32 - 120).pow(2) < 6000;
+            Luma([if inside { 120 + (u * 7 + v * 13) as u8 % 60 } else { 12 + (u * 5 + v * 3) as u8 % 4 }])
+        });
+        let mut bytes = Vec::new();
+        image.write_with_encoder(JpegEncoder::new_with_quality(&mut bytes, 90)).unwrap();
+        bytes
+    }
+
+    fn scan_of(bytes: &[u8]) -> usize {
+        bytes.windows(2).position(|marker| marker == [0xff, 0xda]).unwrap() + 10
+    }
+
+    #[test]
+    fn a_damaged_jpeg_is_flagged() {
+        let whole = photograph();
+        assert!(told("whole.jpg", &whole).unwrap().warnings.is_empty());
+        let scan = scan_of(&whole);
+        let middle = (scan + whole.len()) / 2;
+        let mut marked = whole.clone();
+        marked[middle..middle + 2].copy_from_slice(&[0xff, 0xd3]);
+        let mut missing = whole.clone();
+        missing.drain(middle..middle + 40);
+        let mut twice = whole.clone();
+        twice.splice(middle..middle, whole[middle - 40..middle].iter().copied());
+        for (what, bytes) in [("marked", marked), ("missing", missing), ("twice", twice)] {
+            let loaded = told("damaged.jpg", &bytes).unwrap();
+            assert!(
+                loaded.warnings[0].contains("damaged.jpg is a damaged JPEG"),
+                "{what}: {:?}",
+                loaded.warnings
+            );
         }
     }
 
     #[test]
-    fn a_damaged_jpeg_is_flagged_where_the_decoder_notices() {
-        let mut bytes = bytes_of(&disc(), ImageFormat::Jpeg);
-        let middle = bytes.len() * 3 / 4;
-        // A marker in the middle of the scan.
-        bytes[middle..middle + 2].copy_from_slice(&[0xff, 0xc4]);
-        match told("damaged.jpg", &bytes) {
-            Ok(loaded) => assert!(loaded.warnings[0].contains("damaged JPEG")),
-            Err(error) => assert!(matches!(error, PictureError::Damaged { .. }), "{error}"),
+    fn a_jpeg_without_its_end_or_its_tables_is_refused() {
+        let whole = photograph();
+        for missing in 1..200 {
+            let cut = told("cut.jpg", &whole[..whole.len() - missing]);
+            assert!(matches!(cut, Err(PictureError::CutShort { .. })), "{missing}: {cut:?}");
         }
+        let mut untold = whole;
+        let table = untold.windows(2).position(|marker| marker == [0xff, 0xc4]).unwrap();
+        untold[table + 4] = 0x77;
+        assert!(matches!(told("untold.jpg", &untold), Err(PictureError::Damaged { .. })));
+    }
+
+    /// The figures of docs/capture.md: `cargo test -p host --lib of_changed_bytes -- --nocapture`.
+    #[test]
+    fn of_changed_bytes_in_a_jpeg_most_are_noticed() {
+        let whole = photograph();
+        let (scan, end) = (scan_of(&whole), whole.len() - 2);
+        let (mut refused, mut flagged, mut silent) = (0, 0, 0);
+        let mut random = Random::new(7);
+        for _ in 0..500 {
+            let mut bytes = whole.clone();
+            let at = scan + random.bits() as usize % (end - scan);
+            bytes[at] ^= 1 + (random.bits() % 255) as u8;
+            match parse(Path::new("changed.jpg"), &bytes) {
+                Err(_) => refused += 1,
+                Ok(loaded) if loaded.warnings.is_empty() => silent += 1,
+                Ok(_) => flagged += 1,
+            }
+        }
+        println!(
+            "{} bytes: of 500 changed {flagged} flagged, {refused} refused, {silent} not noticed",
+            whole.len()
+        );
+        assert!(flagged + refused > silent, "more than half");
+    }
+
+    /// The check sum of a PNG's chunk.
+    fn crc(bytes: &[u8]) -> u32 {
+        let step = |crc: u32, _| (crc >> 1) ^ if crc & 1 == 1 { 0xedb8_8320 } else { 0 };
+        !bytes.iter().fold(!0, |crc, byte| (0..8).fold(crc ^ u32::from(*byte), step))
+    }
+
+    /// A small file whose header says 60000 x 60000.
+    fn huge(format: ImageFormat) -> Vec<u8> {
+        const SIDE: u32 = 60_000;
+        let mut bytes = bytes_of(&small(), format);
+        match format {
+            ImageFormat::Pnm => return b"P5 60000 60000 255\n".to_vec(),
+            ImageFormat::Png => {
+                bytes[16..24].copy_from_slice([SIDE; 2].map(u32::to_be_bytes).as_flattened());
+                let crc = crc(&bytes[12..29]);
+                bytes[29..33].copy_from_slice(&crc.to_be_bytes());
+            }
+            ImageFormat::Bmp => {
+                bytes[18..26].copy_from_slice([SIDE; 2].map(u32::to_le_bytes).as_flattened());
+            }
+            ImageFormat::Jpeg => {
+                let frame = bytes.windows(2).position(|marker| marker == [0xff, 0xc0]).unwrap();
+                bytes[frame + 5..frame + 9]
+                    .copy_from_slice([SIDE as u16; 2].map(u16::to_be_bytes).as_flattened());
+            }
+            ImageFormat::Tiff => {
+                // Entries of the directory: tag u16, type u16, count u32, value u32. Of width, height, and rows together.
+                let entries = u32::from_le_bytes(bytes[4..8].try_into().unwrap()) as usize + 2;
+                for entry in bytes[entries..].chunks_mut(12) {
+                    if let [0 | 1 | 0x16, 1, kind, 0, 1, 0, 0, 0, ..] = entry {
+                        *kind = 4;
+                        entry[8..12].copy_from_slice(&SIDE.to_le_bytes());
+                    }
+                }
+            }
+            _ => unreachable!(),
+        }
+        bytes
     }
 
     #[test]
     fn huge_headers_are_refused_before_memory_is_taken() {
-        assert!(matches!(told("a.pgm", b"P5 60000 60000 255\n"), Err(PictureError::TooLarge { .. })));
-        let mut bmp = bytes_of(&disc(), ImageFormat::Bmp);
-        bmp[18..26].copy_from_slice([60_000_u32; 2].map(u32::to_le_bytes).as_flattened());
-        assert!(matches!(told("a.bmp", &bmp), Err(PictureError::TooLarge { .. })));
+        for format in FORMATS {
+            let bytes = huge(format);
+            let path = Path::new("huge");
+            // What a decoder keeps once for all is not the file's.
+            assert!(parse(path, &bytes_of(&small(), format)).is_ok());
+            let mut refused = None;
+            let memory = measure(|| refused = parse(path, &bytes).err());
+            assert!(matches!(refused, Some(PictureError::TooLarge { .. })), "{format:?}: {refused:?}");
+            assert!(memory.bytes_max < 1 << 20, "{format:?}: {} bytes", memory.bytes_max);
+        }
     }
 
     #[test]

@@ -19,6 +19,7 @@
 use std::fmt;
 use std::str::FromStr;
 
+use crate::source::codes::{self, Fault};
 use image::GrayImage;
 use zune_jpeg::JpegDecoder;
 use zune_jpeg::zune_core::bytestream::ZCursor;
@@ -271,7 +272,11 @@ fn jpeg(bytes: &[u8], format: &Format) -> Result<Decoded, FormatError> {
         &completed
     };
     let (values, damage) = match decoder(bytes, format, true).decode() {
-        Ok(values) => (values, None),
+        // What follows the last block may be a camera's filling.
+        Ok(values) => {
+            let fault = codes::fault(bytes).filter(|fault| *fault != Fault::LeftOver);
+            (values, fault.map(|fault| fault.to_string()))
+        }
         Err(damage) => {
             let values = decoder(bytes, format, false).decode();
             (values.map_err(|error| FormatError::Jpeg(error.to_string()))?, Some(damage.to_string()))

@@ -52,6 +52,8 @@ pub(crate) struct Simulated {
     pub(crate) looks: u32,
     /// How long it was waited for in vain.
     pub(crate) waited: Duration,
+    /// What it says of the time from frame to frame.
+    pub(crate) period: Duration,
     /// Real time that each frame takes, and that passes until it is pulled out.
     pub(crate) pace: Duration,
 }
@@ -68,6 +70,7 @@ impl Simulated {
             starts: 0,
             looks: 0,
             waited: Duration::ZERO,
+            period: Duration::from_millis(40),
             pace: Duration::ZERO,
         }
     }
@@ -99,7 +102,7 @@ impl Device for Simulated {
     }
 
     fn period(&self) -> Option<Duration> {
-        Some(Duration::from_millis(40))
+        Some(self.period)
     }
 
     fn start(&mut self) -> io::Result<()> {

@@ -9,11 +9,10 @@ use std::time::{Duration, Instant};
 use super::device::{Device, Frame};
 use super::errors::{CameraError, Doing, is_gone};
 
-/// The least time that a frame is waited for: an exposure in the dark takes some tenths of a second. A camera
-/// that is pulled out meanwhile is noticed when it is started anew, so within two seconds.
+/// How long a frame is waited for beyond a period: an exposure in the dark takes some tenths of a second. A camera
+/// that is pulled out meanwhile is noticed when it is started anew, so within two seconds, or if it sends less than a
+/// frame a second, within a period and a second.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// Or so many periods, for slow cameras.
-const PERIODS: u32 = 4;
 /// Starts in a row without a frame after which a camera is given up.
 const MOST_STARTS: u32 = 5;
 /// From one look for a camera that was unplugged to the next.
@@ -54,7 +53,7 @@ impl<D: Device> Watched<D> {
 
     /// The next good frame; nothing once `stop` is set.
     pub(super) fn next(&mut self, stop: &AtomicBool) -> Result<Option<Frame>, CameraError> {
-        let patience = PATIENCE.max(PERIODS * self.device.period().unwrap_or_default());
+        let patience = PATIENCE + self.device.period().unwrap_or_default();
         let mut silent = 0;
         while !stop.load(Ordering::Relaxed) {
             if !self.running {
@@ -147,15 +146,18 @@ mod tests {
     }
 
     #[test]
-    fn a_camera_pulled_out_is_an_error_at_once_even_while_it_stalls() {
-        for script in
-            [vec![Event::Error(errno::ENODEV)], vec![Event::Stall, Event::RefuseStart(errno::ENODEV)]]
-        {
-            let mut camera = watched(script);
-            let error = camera.next(&GO).unwrap_err().to_string();
-            assert!(error.contains("unplugged"), "{error}");
-            // One patience at most was spent before.
-            assert!(camera.device.waited <= PATIENCE);
+    fn a_camera_pulled_out_is_an_error_within_two_seconds_or_a_period_and_one_even_while_it_stalls() {
+        for period in [33, 200, 1000, 5000].map(Duration::from_millis) {
+            let silent = vec![Event::Stall, Event::RefuseStart(errno::ENODEV)];
+            for (script, most) in
+                [(vec![Event::Error(errno::ENODEV)], Duration::ZERO), (silent, PATIENCE + period)]
+            {
+                let mut camera = watched(script);
+                camera.device.period = period;
+                let error = camera.next(&GO).unwrap_err().to_string();
+                assert!(error.contains("unplugged"), "{error}");
+                assert!(camera.device.waited <= most, "{period:?}: {:?}", camera.device.waited);
+            }
         }
     }
 

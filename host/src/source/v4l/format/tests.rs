@@ -148,7 +148,7 @@ fn a_jpeg_is_read_with_tables_and_without_and_with_padding() {
 }
 
 #[test]
-fn a_damaged_jpeg_is_flagged_or_refused_and_a_cut_one_refused() {
+fn a_jpeg_that_is_cut_or_has_no_sense_is_refused() {
     let bytes = jpeg_of(&disc());
     let format = format("MJPG", 64, 48, 0);
     for part in [0, 1, 2, 10, 50, 90, 99] {
@@ -156,12 +156,31 @@ fn a_damaged_jpeg_is_flagged_or_refused_and_a_cut_one_refused() {
     }
     let mut marked = bytes.clone();
     let middle = bytes.len() - 120;
-    marked[middle..middle + 2].copy_from_slice(&[0xff, 0xc4]);
-    match decode(&marked, &format, false) {
-        Ok(decoded) => assert!(decoded.damage.is_some()),
-        Err(error) => assert!(matches!(error, FormatError::Jpeg(_)), "{error}"),
-    }
+    marked[middle..middle + 2].copy_from_slice(&TABLES);
+    assert!(matches!(decode(&marked, &format, false), Err(FormatError::Jpeg(_))));
     assert!(decode(&jpeg_of(&GrayImage::new(32, 48)), &format, false).is_err());
+}
+
+#[test]
+fn a_jpeg_of_which_something_is_missing_is_flagged_and_one_that_is_filled_up_is_not() {
+    let whole = jpeg_of(&disc());
+    let format = format("MJPG", 64, 48, 0);
+    let end = whole.len() - END.len();
+    let mut missing = whole.clone();
+    missing.drain(end - 140..end);
+    let mut ended = whole.clone();
+    ended[end - 140..end - 138].copy_from_slice(&END);
+    let mut restarted = whole.clone();
+    restarted[end - 140..end - 138].copy_from_slice(&[0xff, 0xd3]);
+    for (what, bytes) in [("missing", missing), ("ended", ended), ("restarted", restarted)] {
+        for bytes in [&bytes, &without_tables(&bytes)] {
+            let decoded = decode(bytes, &format, false).unwrap();
+            assert_eq!(decoded.damage.as_deref(), Some("its codes end too early or mean nothing"), "{what}");
+        }
+    }
+    let mut filled = whole;
+    filled.splice(end..end, [0; 8]);
+    assert_eq!(decode(&filled, &format, false).unwrap().damage, None);
 }
 
 #[test]
