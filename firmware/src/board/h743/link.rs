@@ -4,6 +4,7 @@ use super::{Clock, usb};
 use crate::ports::{self, LinkError};
 use crate::send::send_within;
 use core::sync::atomic::Ordering;
+use embassy_stm32::interrupt::{self, InterruptExt as _};
 use embassy_stm32::usart::BufferedUart;
 use embedded_io::{Read as _, Write as _};
 
@@ -46,7 +47,12 @@ impl ports::Link for Link {
     fn send(&mut self, bytes: &[u8]) -> Result<(), LinkError> {
         match self.host {
             // A wire takes everything, in its own time.
-            Host::Serial => self.serial.write_all(bytes).map_err(|_| LinkError::Closed),
+            Host::Serial => {
+                let sent = self.serial.write_all(bytes).map_err(|_| LinkError::Closed);
+                // The driver wakes its interrupt if it finds nothing under way; what it finds may end while it copies.
+                interrupt::USART3.pend();
+                sent
+            }
             Host::Usb => send_within(PATIENCE, &Clock, bytes, |rest| {
                 if !usb::OPEN.load(Ordering::Relaxed) {
                     return Err(LinkError::Closed);
