@@ -6,16 +6,16 @@ use std::fs;
 use std::path::Path;
 
 /// What became of a run.
-pub struct Ended {
-    pub code: Option<i32>,
-    pub told: String,
+pub(crate) struct Ended {
+    pub(crate) code: Option<i32>,
+    pub(crate) told: String,
     /// The files that are on the disk then, hidden ones too, by their path from its root.
-    pub files: BTreeMap<String, Vec<u8>>,
+    pub(crate) files: BTreeMap<String, Vec<u8>>,
 }
 
 /// Runs the program in a folder, of which `disk` is a disk with room for 64 kB that holds these files. None where
 /// nobody may mount one.
-pub fn on_a_small_disk(folder: &Path, files: &[(&str, &[u8])], args: &[&str]) -> Option<Ended> {
+pub(crate) fn on_a_small_disk(folder: &Path, files: &[(&str, &[u8])], args: &[&str]) -> Option<Ended> {
     let unshare = || {
         let mut command = std::process::Command::new("unshare");
         command.arg("-rm").current_dir(folder);
