@@ -59,6 +59,12 @@ fuzz_target!(|input: (Vec<Entry<'_>>, Option<u16>, Option<(u16, u8)>)| {
     };
     let kept: usize = recording.connections.iter().map(Vec::len).sum();
     assert!(kept <= file.len(), "nothing is added");
+    let mut sound = file.clone();
+    sound.truncate(file.len() - recording.cut);
+    recording.damaged.iter().rev().for_each(|lost| drop(sound.drain(lost.clone())));
+    let again = Recording::parse(Path::new("recording"), &sound).expect("what was read");
+    let whole = Recording { damaged: Vec::new(), cut: 0, ..recording.clone() };
+    assert!(again == whole, "each byte is read or told as lost");
     INBOX.with_borrow_mut(|inbox| {
         for bytes in &recording.connections {
             let mut buffer = [0; MAX_FRAME];

@@ -6,19 +6,25 @@ use host::shape::Shape;
 use host::source::serial::link::frames;
 use host::source::serial::port::{Address, Port, PortError};
 use host::source::serial::recording::Recording;
-use host::source::serial::session::Session;
+use host::source::serial::session::{CAMERAS, Session};
 use image::GrayImage;
+use oracle::camera::Time;
+use oracle::device::{Bench, Eyes, Page};
 use oracle::link;
 use oracle::program::{host, model, within};
 use oracle::scene::{Pair, bent_camera, camera, pair};
 use oracle::socket::{Fault, carry, device, intact, prepare, serve};
+use serialport::SerialPort;
 use shared::wire::{Counters, Decoder, MAX_FRAME};
+use std::cell::RefCell;
 use std::fs;
 use std::io::{ErrorKind, Read, Write};
+use std::os::unix::fs::symlink;
 use std::os::unix::net::UnixListener;
 use std::path::Path;
-use std::sync::Arc;
+use std::rc::Rc;
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, mpsc};
 use std::thread;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
@@ -251,9 +257,52 @@ fn a_device_that_hangs_up_is_waited_for() {
     assert_eq!(Recording::read(Path::new(&tape)).unwrap().connections.len(), 2);
 }
 
+/// Longer than cameras may take to start before that is an error of a device that is new.
+#[test]
+fn a_device_that_comes_back_with_a_dead_eye_is_waited_for() {
+    let (folder, pictures) = scene();
+    let folder = folder.path();
+    let socket = within(folder, "device.socket");
+    let listener = UnixListener::bind(&socket).unwrap();
+    thread::spawn(move || {
+        let page = Rc::new(RefCell::new(Page::default()));
+        let boot = |dead| {
+            let time = Time::default();
+            let (eyes, world) = Eyes::new(pictures.clone().map(GrayImage::into_raw), time.clone());
+            world.borrow_mut().dead = dead;
+            (Bench::new(eyes, time, &page), world)
+        };
+        let (mut bench, _) = boot(false);
+        for (connection, stream) in listener.incoming().enumerate() {
+            let stream = stream.unwrap();
+            stream.set_read_timeout(Some(Duration::from_millis(1))).unwrap();
+            let reader = Box::new(stream.try_clone().unwrap());
+            let port = &mut Port { reader, writer: Box::new(stream) };
+            // Whoever calibrates and exposes it comes before.
+            let limit = if connection < 2 { usize::MAX } else { 3000 };
+            carry(&mut bench, port, intact, limit);
+            if limit < usize::MAX {
+                let (mut reset, world) = boot(true);
+                let end = Instant::now() + CAMERAS + Duration::from_secs(2);
+                while Instant::now() < end {
+                    // As far as the next answer.
+                    carry(&mut reset, port, intact, 1);
+                }
+                world.borrow_mut().dead = false;
+                carry(&mut reset, port, intact, usize::MAX);
+            }
+        }
+    });
+    prepare(folder, &socket);
+    let (calib, out) = (within(folder, "calib.yaml"), within(folder, "out"));
+    let start = Instant::now();
+    host(&["listen", "--port", &socket, "--calib", &calib, "--frames", "6", "--out", &out]).unwrap();
+    assert!(start.elapsed() > CAMERAS);
+    assert!(folder.join("out/000001/model.ply").exists());
+}
+
 /// A device behind a pseudo-terminal, which stays when nobody has it open.
 fn terminal(pictures: Pair) -> String {
-    use serialport::SerialPort;
     let (mut master, slave) = serialport::TTYPort::pair().unwrap();
     let name = slave.name().unwrap();
     master.set_timeout(Duration::from_millis(1)).unwrap();
@@ -280,6 +329,53 @@ fn a_pseudo_terminal_is_a_port() {
     let (calib, out) = (within(folder, "calib.yaml"), within(folder, "out"));
     host(&["listen", "--port", &name, "--calib", &calib, "--frames", "1", "--out", &out]).unwrap();
     assert!(model(&folder.join("out/000001")) == direct(folder));
+}
+
+#[test]
+fn a_terminal_that_hangs_up_is_waited_for() {
+    let (folder, pictures) = scene();
+    let folder = folder.path();
+    let plain = serve(folder, &pictures, intact, usize::MAX);
+    prepare(folder, &plain);
+    let port = within(folder, "port");
+    let ((there, wait), name) = (mpsc::channel(), port.clone());
+    thread::spawn(move || {
+        // The first end goes in the middle of the second pair, as that of an adapter which is pulled out.
+        for limit in [3000, usize::MAX] {
+            let (mut master, slave) = serialport::TTYPort::pair().unwrap();
+            let mut to_host = master.try_clone_native().unwrap();
+            master.set_timeout(Duration::from_millis(1)).unwrap();
+            to_host.set_timeout(Duration::from_secs(60)).unwrap();
+            let mut device = Address::Socket(plain.clone()).open(0).unwrap();
+            symlink(slave.name().unwrap(), &name).unwrap();
+            let _ = there.send(());
+            let (mut passed, mut buffer) = (0, [0; 256]);
+            while passed < limit {
+                if let Ok(count) = master.read(&mut buffer) {
+                    device.writer.write_all(&buffer[..count]).unwrap();
+                }
+                match device.reader.read(&mut buffer) {
+                    Ok(count) => {
+                        passed += count;
+                        to_host.write_all(&buffer[..count]).unwrap();
+                    }
+                    Err(error) => {
+                        assert!(matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut))
+                    }
+                }
+            }
+            fs::remove_file(&name).unwrap();
+        }
+    });
+    wait.recv().unwrap();
+    let (calib, out, tape) = (within(folder, "calib.yaml"), within(folder, "out"), within(folder, "tape"));
+    host(&["listen", "--port", &port, "--calib", &calib, "--frames", "4", "--out", &out, "--record", &tape])
+        .unwrap();
+    let truth = direct(folder);
+    for pair in 1..=4 {
+        assert!(model(&folder.join(format!("out/{pair:06}"))) == truth, "pair {pair}");
+    }
+    assert_eq!(Recording::read(Path::new(&tape)).unwrap().connections.len(), 2);
 }
 
 /// A reader that is counted while it is open.

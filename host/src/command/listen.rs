@@ -38,7 +38,7 @@ mod recording;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -59,6 +59,7 @@ use crate::reconstruct::Options;
 use crate::report::words::{parse_polarity, parse_threshold};
 use crate::source::exposure::Range;
 use crate::source::serial::inbox::Message;
+use crate::source::serial::link::Tap;
 use crate::source::serial::port::Address;
 use crate::source::serial::recording::Writer;
 use crate::source::serial::session::Session;
@@ -221,7 +222,7 @@ fn one(args: &Args, seat: &Seat<'_>, link: Option<&Link>, stop: &AtomicBool) -> 
     let audience = Audience { view, voice: voice.transpose()?, control, name };
     let mut desk = Desk::new((&model, &options), (seat.out.as_deref(), wanted), audience);
     let end = args.seconds.map(|seconds| Instant::now() + Duration::from_secs(seconds.into()));
-    let mut session = begin(args, seat.port, &model, &mut desk)?;
+    let (mut session, tap) = begin(args, seat.port, &model, &mut desk)?;
     let mut orders = Orders::new(args, asked, &options, desk.audience.view.is_some());
     let heard = listen(args, (&mut session, &mut orders), &mut desk, || {
         stop.load(Ordering::Relaxed) || end.is_some_and(|end| Instant::now() >= end)
@@ -231,17 +232,27 @@ fn one(args: &Args, seat: &Seat<'_>, link: Option<&Link>, stop: &AtomicBool) -> 
     if stopped.is_err() {
         desk.remark("the device was not there any more to be told to stop");
     }
+    let tally = session.tally();
+    // Nothing comes after it.
+    drop(session);
+    let recorded = tap.map_or(Ok(()), |tap| tap.lock().unwrap_or_else(PoisonError::into_inner).finish());
     heard?;
-    desk.close(&session.tally())
+    recorded?;
+    desk.close(&tally)
 }
 
 /// Find the device and greet it. The recording has to be new before anything comes, and is taken away again if
 /// there is nothing to record.
-fn begin(args: &Args, port: &Address, model: &PairModel, desk: &mut Desk<'_>) -> Result<Session, Failure> {
+fn begin(
+    args: &Args,
+    port: &Address,
+    model: &PairModel,
+    desk: &mut Desk<'_>,
+) -> Result<(Session, Option<Tap>), Failure> {
     let recording = args.record.as_ref().map(|path| Writer::begin(path, model)).transpose()?;
     let tap = recording.map(|writer| Arc::new(Mutex::new(writer)));
-    let begun = args.port.begin(port, tap).map_err(Failure::from);
-    let greeted = begun.and_then(|(session, hello)| desk.greeted(&hello).map(|()| session));
+    let begun = args.port.begin(port, tap.clone()).map_err(Failure::from);
+    let greeted = begun.and_then(|(session, hello)| desk.greeted(&hello).map(|()| (session, tap)));
     if let (Err(_), Some(path)) = (&greeted, &args.record) {
         // Why there is no device matters more than a file that stays.
         let _ = fs::remove_file(path);

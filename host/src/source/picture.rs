@@ -5,7 +5,7 @@
 //! user says otherwise. Sizes are held against a limit before any pixel gets memory.
 //!
 //! Decoders of JPEG go on where bytes are damaged, and half a silhouette looks like an object. So a JPEG is
-//! first read strictly, and its codes are held against its header ([`codes`]); one that fails is refused if it ends too
+//! first read strictly, and its codes are held against its header (`codes.rs`); one that fails is refused if it ends too
 //! early, and flagged otherwise.
 
 use std::fs;

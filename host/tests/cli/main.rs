@@ -13,6 +13,8 @@ use nalgebra::{Rotation3, Vector3};
 use serde_json::Value;
 use tempfile::TempDir;
 
+#[cfg(target_os = "linux")]
+mod disk;
 mod pairs;
 mod refusals;
 mod rendered;

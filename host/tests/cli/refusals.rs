@@ -138,6 +138,18 @@ fn nobody_listening_is_no_failure() {
     }
 }
 
+#[test]
+fn a_calibration_of_another_resolution_is_refused_by_both_sizes() {
+    let folder = TempDir::new().unwrap();
+    StereoCamera::rectified(640, 480, 750.0, 60.0)
+        .write_opencv_yaml(folder.path().join("large.yaml"))
+        .unwrap();
+    let (left, right) = (torus("left.png"), torus("right.png"));
+    let told = bad(folder.path(), &["replay", &left, &right, "--calib", "large.yaml", "--out", "model"], 1);
+    assert!(told.contains("640x480") && told.contains("320x240"), "{told}");
+    assert!(!folder.path().join("model").exists());
+}
+
 /// A limit on the length of files stands for a full disk: writing fails in the middle.
 #[test]
 #[cfg(unix)]
@@ -169,4 +181,36 @@ fn a_full_disk_is_a_failure_that_leaves_what_was_there() {
     assert_eq!(limited("64").0, Some(1));
     assert_eq!(results(&folder.path().join("model")), whole, "the results before are untouched");
     assert_eq!(limited("unlimited").0, Some(0));
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_disk_without_room_is_named_and_holds_whole_files_alone() {
+    let folder = TempDir::new().unwrap();
+    let [left, right, truth] = ["left.png", "right.png", "truth.ply"].map(torus);
+    let convert = ["convert", &truth, "disk/truth.obj"];
+    let render = [&["render", "torus", "--out", "disk"], &SMALL[..]].concat();
+    let replay = ["replay", &left, &right, "--out", "disk/model"];
+    // What a command names, what is there before, and what of a whole run may be there afterwards.
+    let old: &[u8] = b"old";
+    let cases: [(&[&str], _, &[_], &[&str]); 5] = [
+        (&replay, "disk/model", &[], &[]),
+        (&replay, "disk/model", &[("model/model.ply", old), ("model/report.json", old)], &[]),
+        (&convert, "disk/truth.obj", &[], &[]),
+        (&convert, "disk/truth.obj", &[("truth.obj", old)], &[]),
+        (&render, "disk/truth.ply", &[("truth.ply", old)], &["left.png", "right.png", "calib.yaml"]),
+    ];
+    for (args, named, before, new) in cases {
+        let Some(ended) = disk::on_a_small_disk(folder.path(), before, args) else { return };
+        assert_eq!(ended.code, Some(1), "{args:?}: {}", ended.told);
+        let told = ended.told.lines().find(|line| line.starts_with("error: ")).unwrap_or_default();
+        assert!(told.contains(named) && told.contains("there is no room"), "{args:?}: {}", ended.told);
+        let mut files = ended.files;
+        for name in new {
+            assert!(files.remove(*name) == Some(fs::read(torus(name)).unwrap()), "{args:?}: {name}");
+        }
+        let before: Vec<_> =
+            before.iter().map(|(name, bytes)| ((*name).to_owned(), bytes.to_vec())).collect();
+        assert!(files.iter().map(|(n, b)| (n.clone(), b.clone())).eq(before), "{args:?}: {:?}", files.keys());
+    }
 }

@@ -2,16 +2,28 @@
 
 use super::Args;
 use super::desk::Desk;
+use crate::command::words_of;
 use crate::live::control::Settings;
 use crate::reconstruct::{Front, Options};
 use crate::source::exposure::Exposure;
 use crate::source::serial::inbox::Message;
-use crate::source::serial::session::{Session, SessionError};
+use crate::source::serial::session::{CAMERAS, Session, SessionError};
 use shared::wire::{self, ErrorCode, ExposureSetting, PictureKind, ToDevice};
 use std::mem::take;
+use std::time::{Duration, Instant};
 
 /// What a device can be told of how it looks.
 pub(super) const ORDERS: [&str; 3] = ["threshold", "polarity", "exposure"];
+
+/// From one order to start to the next.
+const START_AGAIN: Duration = Duration::from_millis(500);
+
+/// Cameras that do not answer: they may still be starting, or the device tries them again by itself.
+struct Blind {
+    since: Instant,
+    again: Instant,
+    is_told: bool,
+}
 
 /// What the device is to be told: nothing that nobody has said.
 pub(super) struct Orders {
@@ -21,8 +33,11 @@ pub(super) struct Orders {
     settings: Settings,
     /// Whether threshold and polarity were among it.
     said: [bool; 2],
-    /// Whether it takes pairs.
+    /// Whether it takes pairs, and ever has.
     runs: bool,
+    has_run: bool,
+    /// Its cameras do not answer.
+    blind: Option<Blind>,
     /// Whether the pictures of each pair are wanted, and of the next one are to be asked for.
     pictures: bool,
     due: bool,
@@ -38,7 +53,8 @@ impl Orders {
         let kept = [threshold.map(ToDevice::Threshold), polarity.map(ToDevice::Polarity), None];
         let said = [threshold.is_some(), polarity.is_some()];
         let pictures = options.front != Front::Balls;
-        Self { kept, settings, said, runs: false, pictures, due: pictures, pair: None }
+        let (runs, has_run, blind) = (false, false, None);
+        Self { kept, settings, said, runs, has_run, blind, pictures, due: false, pair: None }
     }
 
     /// Has a device that was greeted begin.
@@ -48,20 +64,45 @@ impl Orders {
                 desk.give(session, which, order)?;
             }
         }
-        self.runs = false;
-        self.run(desk.audience.control.as_ref().is_none_or(|control| control.wants_pairs()), session)?;
-        (self.due, self.pair) = (self.pictures, None);
-        self.ask_for_pictures(session)
+        (self.runs, self.blind) = (false, None);
+        self.run(session, desk)
     }
 
-    /// Has the device take pairs, or none.
-    fn run(&mut self, runs: bool, session: &mut Session) -> Result<(), SessionError> {
+    /// Has the device take pairs, or none. Cameras that ran before are waited for.
+    fn run(&mut self, session: &mut Session, desk: &Desk<'_>) -> Result<(), SessionError> {
+        let runs = desk.audience.control.as_ref().is_none_or(|control| control.wants_pairs());
         match (self.runs, runs) {
-            (false, true) => session.order_cameras(&ToDevice::Start)?,
-            (true, false) => session.order(&ToDevice::Stop)?,
-            _ => {}
+            (false, true) if self.blind.as_ref().is_some_and(|blind| Instant::now() < blind.again) => Ok(()),
+            (false, true) => match session.order(&ToDevice::Start) {
+                Ok(()) => {
+                    (self.runs, self.has_run, self.blind) = (true, true, None);
+                    (self.due, self.pair) = (self.pictures, None);
+                    self.ask_for_pictures(session)
+                }
+                Err(error @ SessionError::Refused(ErrorCode::Camera)) => self.wait_for_cameras(error, desk),
+                Err(error) => Err(error),
+            },
+            (true, false) => {
+                self.runs = false;
+                session.order(&ToDevice::Stop)
+            }
+            _ => Ok(()),
         }
-        self.runs = runs;
+    }
+
+    fn wait_for_cameras(&mut self, error: SessionError, desk: &Desk<'_>) -> Result<(), SessionError> {
+        let now = Instant::now();
+        let blind = self.blind.get_or_insert(Blind { since: now, again: now, is_told: false });
+        blind.again = now + START_AGAIN;
+        if blind.since + CAMERAS <= now {
+            if !self.has_run {
+                return Err(error);
+            }
+            if !blind.is_told {
+                desk.remark(&format!("{}; waiting for it", words_of(&error)));
+                blind.is_told = true;
+            }
+        }
         Ok(())
     }
 
@@ -90,9 +131,14 @@ impl Orders {
     /// Asks for pictures that are due, and passes on what was changed by those who look on.
     pub(super) fn follow(&mut self, session: &mut Session, desk: &mut Desk<'_>) -> Result<(), SessionError> {
         self.ask_for_pictures(session)?;
+        self.pass_on(session, desk)?;
+        self.run(session, desk)
+    }
+
+    fn pass_on(&mut self, session: &mut Session, desk: &mut Desk<'_>) -> Result<(), SessionError> {
         let Some(control) = &desk.audience.control else { return Ok(()) };
         let ((settings, _), before) = (control.settings(), self.settings);
-        let (wanted, said) = (control.wants_pairs(), control.said());
+        let said = control.said();
         // What is said for the first time may be what it would be otherwise, but not what the device has.
         let [threshold, polarity] = [0, 1].map(|k| said[k] && !self.said[k]);
         let exposure = settings.exposure.filter(|_| settings.exposure != before.exposure);
@@ -119,6 +165,6 @@ impl Orders {
         }
         // Not before: what a device did not hear, because it was lost, it is told when it is back.
         (self.settings, self.said) = (settings, said);
-        self.run(wanted, session)
+        Ok(())
     }
 }

@@ -31,6 +31,21 @@ pub(crate) fn replay(
     let mut pace = Pace::new(rate);
     let audience = Audience { view, ..Audience::default() };
     let mut desk = Desk::new((&recording.calibration, options), place, audience);
+    for lost in &recording.damaged {
+        desk.remark(&format!(
+            "warning: {} is damaged at byte {}: {} bytes are lost; copy it again from where it was made",
+            path.display(),
+            lost.start,
+            lost.len()
+        ));
+    }
+    if recording.cut > 0 {
+        desk.remark(&format!(
+            "{} was cut off: its last {} bytes are left out",
+            path.display(),
+            recording.cut
+        ));
+    }
     let (mut inbox, mut tally) = (Inbox::new()?, Tally::default());
     for (k, bytes) in recording.connections.iter().enumerate() {
         let mut buffer = vec![0; MAX_FRAME];

@@ -14,7 +14,7 @@ use shared::limits::CapacityError;
 use shared::wire::{Counters, Decoder, Frame, MAX_FRAME, Sequence, ToDevice};
 
 use super::port::Port;
-use super::recording::{RecordingError, Writer};
+use super::recording::{MAX_BYTES, RecordingError, Writer};
 
 /// Longest frame of a command, bytes: an upload of a calibration with both lenses.
 pub const MAX_COMMAND: usize = 1024;
@@ -175,7 +175,7 @@ fn pump(
     sender: &SyncSender<Arrived>,
     shared: &Shared,
 ) -> LinkError {
-    let (mut frame, mut bytes) = ([0; MAX_FRAME], [0; 4096]);
+    let (mut frame, mut bytes) = ([0; MAX_FRAME], [0; MAX_BYTES]);
     let mut decoder = Decoder::new(&mut frame);
     while !shared.stop.load(Ordering::Relaxed) {
         let count = match reader.read(&mut bytes) {

@@ -6,10 +6,11 @@
 //! ```
 //!
 //! Numbers are little-endian. Entries are appended, and handed to the system whenever a frame ends, so a
-//! recording that was cut off is a shorter recording.
+//! recording that was cut off is a shorter recording. What is damaged is left out up to the next entry, and told.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Read, Write};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -24,6 +25,8 @@ const BYTES: u8 = 1;
 const CALIBRATION: u8 = 2;
 /// Kind, time and length.
 const HEAD: usize = 13;
+/// Most bytes of the device in one entry: so many are read of a port at once.
+pub(super) const MAX_BYTES: usize = 4096;
 
 /// Why there is no recording.
 #[derive(Debug, thiserror::Error)]
@@ -42,7 +45,7 @@ pub enum RecordingError {
         /// What the system said.
         source: io::Error,
     },
-    /// An entry of an unknown kind, or none that can be read.
+    /// It does not begin as one, or what its calibration was cannot be read.
     #[error("the recording {} is damaged at byte {at}; copy it again from where it was made", path.display())]
     Damaged {
         /// The file.
@@ -98,7 +101,16 @@ impl Writer {
     /// # Errors
     /// When the file cannot be written.
     pub fn bytes(&mut self, bytes: &[u8]) -> Result<(), RecordingError> {
-        self.append(BYTES, bytes)
+        bytes.chunks(MAX_BYTES).try_for_each(|bytes| self.append(BYTES, bytes))
+    }
+
+    /// Wait until all of it is on the disk: some systems say only then that it is full.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn finish(&mut self) -> Result<(), RecordingError> {
+        let done = self.file.flush().and_then(|()| self.file.get_ref().sync_all());
+        done.map_err(|source| self.failed(source))
     }
 
     fn append(&mut self, kind: u8, bytes: &[u8]) -> Result<(), RecordingError> {
@@ -128,6 +140,10 @@ pub struct Recording {
     pub connections: Vec<Vec<u8>>,
     /// Time from its beginning to its last entry, us.
     pub length: u64,
+    /// Which bytes of the file are damaged, and were left out.
+    pub damaged: Vec<Range<usize>>,
+    /// Bytes at its end of an entry that is not whole, as a writer that is killed leaves it; left out too.
+    pub cut: usize,
 }
 
 /// Whether a file is a recording, as far as its first bytes say.
@@ -139,10 +155,10 @@ pub fn is_recording(path: &Path) -> bool {
 }
 
 impl Recording {
-    /// Read a recording. Of one that was cut off, the last entry that is not whole is left out.
+    /// Read a recording. What is damaged or cut off is left out.
     ///
     /// # Errors
-    /// When it cannot be read, or is none.
+    /// When it cannot be read, is none, or has no calibration.
     pub fn read(path: &Path) -> Result<Self, RecordingError> {
         let file = std::fs::read(path).map_err(|source| RecordingError::Io { path: path.into(), source })?;
         Self::parse(path, &file)
@@ -151,28 +167,81 @@ impl Recording {
     /// Read the recording in the bytes of a file, which errors call `path`.
     ///
     /// # Errors
-    /// When it is none.
+    /// When it is none, or has no calibration.
     pub fn parse(path: &Path, file: &[u8]) -> Result<Self, RecordingError> {
-        let damaged =
-            |rest: &[u8]| RecordingError::Damaged { path: path.into(), at: file.len() - rest.len() };
-        let mut rest = file.strip_prefix(MAGIC).ok_or_else(|| damaged(file))?;
+        let unreadable = |at| RecordingError::Damaged { path: path.into(), at };
+        let mut rest = file.strip_prefix(MAGIC).ok_or_else(|| unreadable(0))?;
         let (mut calibration, mut connections, mut length) = (None, Vec::new(), 0);
-        while let Some((head, after)) = rest.split_first_chunk::<HEAD>() {
-            let [kind, t0, t1, t2, t3, t4, t5, t6, t7, l0, l1, l2, l3] = *head;
-            let count = u32::from_le_bytes([l0, l1, l2, l3]) as usize;
-            let Some((bytes, after)) = after.split_at_checked(count) else { break };
+        let (mut damaged, mut cut) = (Vec::new(), 0);
+        while !rest.is_empty() {
+            let at = file.len() - rest.len();
+            let Some((Entry { kind, time, bytes }, after)) = entry(rest) else {
+                let next = (1..rest.len()).find(|&k| begins_an_entry(&rest[k..]));
+                if next.is_none() && is_cut(rest) {
+                    cut = rest.len();
+                    break;
+                }
+                let lost = next.unwrap_or(rest.len());
+                damaged.push(at..at + lost);
+                rest = &rest[lost..];
+                continue;
+            };
             match kind {
+                CALIBRATION => calibration = Some(uploaded(bytes).ok_or_else(|| unreadable(at))?),
                 CONNECTION => connections.push(Vec::new()),
-                BYTES => connections.last_mut().ok_or_else(|| damaged(rest))?.extend_from_slice(bytes),
-                CALIBRATION => calibration = Some(uploaded(bytes).ok_or_else(|| damaged(rest))?),
-                _ => return Err(damaged(rest)),
+                _ => match connections.last_mut() {
+                    Some(last) => last.extend_from_slice(bytes),
+                    // Where it begins is damaged.
+                    None => connections.push(bytes.to_vec()),
+                },
             }
-            length = u64::from_le_bytes([t0, t1, t2, t3, t4, t5, t6, t7]);
+            length = time;
             rest = after;
         }
-        let calibration = calibration.ok_or_else(|| RecordingError::Empty { path: path.into() })?;
-        Ok(Self { calibration, connections, length })
+        let none = || match damaged.first() {
+            Some(first) => unreadable(first.start),
+            None => RecordingError::Empty { path: path.into() },
+        };
+        let calibration = calibration.ok_or_else(none)?;
+        Ok(Self { calibration, connections, length, damaged, cut })
     }
+}
+
+/// What was appended at a time.
+struct Entry<'a> {
+    kind: u8,
+    time: u64,
+    bytes: &'a [u8],
+}
+
+/// The kind, the time and the length in the head of an entry, if a writer can have written it.
+fn head([kind, t0, t1, t2, t3, t4, t5, t6, t7, l0, l1, l2, l3]: [u8; HEAD]) -> Option<(u8, u64, usize)> {
+    let most = match kind {
+        CONNECTION => 0,
+        BYTES => MAX_BYTES,
+        CALIBRATION => MAX_COMMAND,
+        _ => return None,
+    };
+    let length = u32::from_le_bytes([l0, l1, l2, l3]) as usize;
+    (length <= most).then_some((kind, u64::from_le_bytes([t0, t1, t2, t3, t4, t5, t6, t7]), length))
+}
+
+/// The entry that begins here, if it is whole, and what follows it.
+fn entry(rest: &[u8]) -> Option<(Entry<'_>, &[u8])> {
+    let (first, after) = rest.split_first_chunk()?;
+    let (kind, time, length) = head(*first)?;
+    let (bytes, after) = after.split_at_checked(length)?;
+    Some((Entry { kind, time, bytes }, after))
+}
+
+/// Whether what is no whole entry may be the beginning of one.
+fn is_cut(rest: &[u8]) -> bool {
+    rest.split_first_chunk().is_none_or(|(first, _)| head(*first).is_some())
+}
+
+/// Whether an entry begins among bytes that may be anything: what looks like one by chance is followed by none.
+fn begins_an_entry(rest: &[u8]) -> bool {
+    entry(rest).is_some_and(|(_, after)| entry(after).is_some() || is_cut(after))
 }
 
 /// The calibration in the frame of an upload.

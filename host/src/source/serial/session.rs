@@ -20,7 +20,7 @@ const ANSWER: Duration = Duration::from_secs(12);
 /// From one command to its repetition.
 const COMMAND_AGAIN: Duration = Duration::from_secs(3);
 /// How long its cameras may take to start.
-const CAMERAS: Duration = Duration::from_secs(15);
+pub const CAMERAS: Duration = Duration::from_secs(15);
 /// From one look for a device that is gone to the next.
 const LOOK_AGAIN: Duration = Duration::from_millis(500);
 /// Silence after which a device is taken for gone: it tells its health every 10 s.
