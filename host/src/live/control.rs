@@ -267,6 +267,8 @@ fn pairs(text: &str) -> Result<Option<u32>, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::damaged::damaged;
+    use crate::random::Random;
 
     fn control() -> Control {
         let exposure = Ok(Range { least: 1, most: 500, unit: "x 0.1 ms", auto: true });
@@ -320,6 +322,25 @@ mod tests {
             assert!(error.contains(words), "{wish}: {error}");
         }
         assert_eq!(control.settings(), (Settings::default(), 0));
+    }
+
+    #[test]
+    fn whatever_is_sent_is_obeyed_as_a_whole_or_changes_nothing() {
+        let sound = br#"{"threshold": "90", "region": "10,20,100,120", "exposure": "auto", "pairs": "3"}"#;
+        let (mut random, mut obeyed) = (Random::new(1), 0);
+        for _ in 0..20_000 {
+            let control = control();
+            control.saw((320, 240));
+            let before = control.told();
+            match control.wish(&damaged(sound, &mut random)) {
+                Ok(()) => {
+                    assert!(control.settings().0.region.is_none_or(|region| region.is_within(320, 240)));
+                    obeyed += 1;
+                }
+                Err(error) => assert!(!error.is_empty() && control.told() == before, "{error}"),
+            }
+        }
+        assert!((1..20_000).contains(&obeyed), "{obeyed} of 20000 are still wishes");
     }
 
     #[test]
