@@ -360,7 +360,7 @@ fn a_terminal_that_hangs_up_is_waited_for() {
                         to_host.write_all(&buffer[..count]).unwrap();
                     }
                     Err(error) => {
-                        assert!(matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut))
+                        assert!(matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut));
                     }
                 }
             }
