@@ -5,7 +5,7 @@
 use arbitrary::Arbitrary;
 use fuzz::figure::{Figure, draw};
 use host::memory::Storage;
-use host::source::serial::inbox::{Inbox, Message, Pair};
+use host::source::serial::inbox::{Inbox, Message};
 use libfuzzer_sys::fuzz_target;
 use oracle::core::hangs_together;
 use oracle::wire::check;
@@ -165,9 +165,8 @@ fn survive(shape: Shape<'_>, inbox: &mut Inbox, frame: &mut [u8]) {
     let (kind, sequence, payload) = oracle::link::frames(&frame[..len]).pop().expect("a frame");
     let frame = Frame { kind, sequence, repeated: false, payload: &payload };
     let read = inbox.read(&frame).expect("a host has room for every shape");
-    let Message::Pair(Pair { result: Ok(outcome), .. }) = read else {
-        panic!("a shape came back as {read:?}")
-    };
+    let Message::Pair(pair) = read else { panic!("a pair came back as {read:?}") };
+    let outcome = pair.result.expect("it is not refused");
     let memory = inbox.memory();
     let read = Shape::of(&memory, &outcome);
     assert_eq!(read.contour.len(), shape.contour.len());
