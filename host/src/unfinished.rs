@@ -1,11 +1,11 @@
 //! Files and folders under way. What is written has a hidden name, which nobody takes for a result, until it is whole
 //! and is moved to its own; so whoever is killed meanwhile leaves the old file or the new one.
 //!
-//! A power loss is another matter. What one order of a user makes (an export, a calibration) is on the disk before it
-//! gets its name ([`Durable`]), so it is the old file or the new one even then, and a file system that says only when
-//! it is asked that it is full has said so. What comes pair after pair (results, recorded pictures) is left to the
-//! system: to wait for the disk takes 16 to 30 ms for the four files of a pair where writing them takes 1 to 2 (ext4).
-//! So after a power loss the newest of these may be missing or empty; after a kill they never are.
+//! A power loss is another matter. Exports ([`Durable`]) and calibrations are on the disk before they get their names,
+//! so each is the old file or the new one even then, and a file system that says only when it is asked that it is full
+//! has said so. Everything else is left to the system: to wait for the disk takes 16 to 30 ms for the four files of a
+//! pair where writing them takes 1 to 2 (ext4). So after a power loss the newest of these may be missing or empty; after
+//! a kill they never are.
 //!
 //! What a killed run leaves under hidden names is swept away by a later one, ten seconds after it was last written to.
 //! Whoever writes holds a lock, which the system takes back from the dead. Where it knows no locks, nothing is swept;

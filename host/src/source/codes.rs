@@ -61,7 +61,7 @@ pub(super) enum Fault {
     /// Something else stands where codes begin anew.
     #[error("its codes do not begin anew where they should")]
     Restart,
-    /// Something else follows the last block; some cameras fill up their frames there.
+    /// Something else follows the last block, before the end; some cameras fill up their frames there.
     #[error("its codes go on behind the image")]
     LeftOver,
 }
@@ -140,7 +140,11 @@ fn scan(
             }
         }
     }
-    Some((codes.marker() != Some(END_OF_IMAGE)).then_some(Fault::LeftOver))
+    if codes.marker() == Some(END_OF_IMAGE) {
+        return Some(None);
+    }
+    let ends = codes.rest.windows(2).any(|pair| pair == [0xff, END_OF_IMAGE]);
+    Some(Some(if ends { Fault::LeftOver } else { Fault::Short }))
 }
 
 /// The bits of a scan.

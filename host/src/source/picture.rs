@@ -12,7 +12,7 @@ use std::fs;
 use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
 
-use super::codes;
+use super::codes::{self, Fault};
 use image::{DynamicImage, GrayImage, ImageError, ImageFormat, ImageReader, Limits, Luma};
 use shared::limits::MAX_SIDE;
 use zune_jpeg::zune_core::bytestream::ZCursor;
@@ -212,14 +212,14 @@ fn jpeg_damage(path: &Path, bytes: &[u8]) -> Result<Option<String>, PictureError
         // Whether the header is too large or broken, the decoder of all formats will say.
         return Ok(None);
     }
-    let damage = match decoder.decode() {
-        Err(damage) => damage.to_string(),
+    let (damage, has_end) = match decoder.decode() {
+        Err(damage) => (damage.to_string(), false),
         Ok(_) => match codes::fault(bytes) {
-            Some(fault) => fault.to_string(),
+            Some(fault) => (fault.to_string(), fault == Fault::LeftOver),
             None => return Ok(None),
         },
     };
-    if !bytes.windows(2).rev().take(64).any(|end| end == END_OF_IMAGE) {
+    if !has_end && !bytes.windows(2).rev().take(64).any(|end| end == END_OF_IMAGE) {
         return Err(PictureError::CutShort { path: path.into() });
     }
     Ok(Some(format!(
@@ -360,6 +360,10 @@ mod tests {
             let cut = told("cut.jpg", &whole[..whole.len() - missing]);
             assert!(matches!(cut, Err(PictureError::CutShort { .. })), "{missing}: {cut:?}");
         }
+        // Filling before the end, and much behind it, as cameras write it.
+        let end = whole.len() - 2;
+        let filled = [&whole[..end], &[0; 8], &whole[end..], &[0; 500]].concat();
+        assert!(told("filled.jpg", &filled).is_ok());
         let mut untold = whole;
         let table = untold.windows(2).position(|marker| marker == [0xff, 0xc4]).unwrap();
         untold[table + 4] = 0x77;

@@ -26,7 +26,7 @@ pub struct Flash {
 impl Flash {
     /// The flash of this driver, and the processor's caches.
     pub(super) fn new(inner: flash::Flash<'static, Blocking>, scb: SCB) -> Self {
-        // SAFETY: it changes what happens while faults are masked, which is in `unfaulted` alone.
+        // SAFETY: it changes what happens in `unfaulted` and in the handlers of faults, which do not come back.
         unsafe { scb.ccr.modify(|bits| bits | BFHFNMIGN) };
         Self { inner, scb }
     }

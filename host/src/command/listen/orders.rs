@@ -118,7 +118,8 @@ impl Orders {
     }
 
     fn ask_for_pictures(&mut self, session: &mut Session) -> Result<(), SessionError> {
-        if !take(&mut self.due) {
+        // Who is stopped would go on with a pair for each order; a start asks anew.
+        if !take(&mut self.due) || !self.runs {
             return Ok(());
         }
         match session.order(&ToDevice::Grab(PictureKind::Grey)) {

@@ -31,12 +31,14 @@ pub(crate) fn replay(
     let mut pace = Pace::new(rate);
     let audience = Audience { view, ..Audience::default() };
     let mut desk = Desk::new((&recording.calibration, options), place, audience);
-    for lost in &recording.damaged {
+    if let [first, others @ ..] = &recording.damaged[..] {
+        let more =
+            if others.is_empty() { String::new() } else { format!(" and in {} more places", others.len()) };
         desk.remark(&format!(
-            "warning: {} is damaged at byte {}: {} bytes are lost; copy it again from where it was made",
+            "warning: {} is damaged at byte {}{more}: {} bytes are lost; copy it again from where it was made",
             path.display(),
-            lost.start,
-            lost.len()
+            first.start,
+            recording.damaged.iter().map(ExactSizeIterator::len).sum::<usize>()
         ));
     }
     if recording.cut > 0 {
