@@ -111,6 +111,11 @@ emulator() {
     need qemu-system-arm qemu-system-arm
 }
 
+# File systems of one's own, to be full soon, which Ubuntu grants nobody but root unless it is told to.
+small_disks() {
+    unshare -rm true 2>/dev/null || sudo -n sysctl -q -w kernel.apparmor_restrict_unprivileged_userns=0
+}
+
 part_fmt() {
     toolchain "cargo fmt --version" "install rustfmt (Debian: apt-get install rustfmt)" component add rustfmt
     check cargo fmt --all --check
@@ -127,6 +132,7 @@ part_test() {
     emulator
     # What the report page is looked at with.
     need chromium chromium
+    small_disks
     tests cargo test --workspace --locked --no-fail-fast
     # The frozen bits again, as the optimiser makes them, and the command that a newcomer runs first.
     tests cargo test --release --locked -p system-tests --test determinism --test warp

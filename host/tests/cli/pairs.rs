@@ -77,15 +77,20 @@ fn one_refused_pair_does_not_stop_the_others() {
     assert!(results(&folder.path().join("out/a"))[0] == expected()[0]);
 }
 
+/// Puts the pair of the torus there as `a` and as `b`.
+fn two_pairs(folder: &Path) {
+    for pair in ["a", "b"].map(|name| folder.join(name)) {
+        fs::create_dir_all(&pair).unwrap();
+        for file in ["left.png", "right.png", "calib.yaml"] {
+            fs::copy(torus(file), pair.join(file)).unwrap();
+        }
+    }
+}
+
 #[test]
 fn results_beside_their_pairs_do_not_hide_them() {
     let folder = TempDir::new().unwrap();
-    for pair in ["many/a", "many/b"] {
-        fs::create_dir_all(folder.path().join(pair)).unwrap();
-        for file in ["left.png", "right.png", "calib.yaml"] {
-            fs::copy(torus(file), folder.path().join(pair).join(file)).unwrap();
-        }
-    }
+    two_pairs(&folder.path().join("many"));
     for _ in 0..2 {
         let told = good(folder.path(), &["replay", "many", "--out", "many", "--json", "--jobs", "65535"]);
         assert_eq!(json(&told)["pairs"].as_array().unwrap().len(), 2);
@@ -96,12 +101,7 @@ fn results_beside_their_pairs_do_not_hide_them() {
 #[test]
 fn timings_are_a_row_a_stage_beside_the_results() {
     let folder = TempDir::new().unwrap();
-    for pair in ["many/a", "many/b"] {
-        fs::create_dir_all(folder.path().join(pair)).unwrap();
-        for file in ["left.png", "right.png", "calib.yaml"] {
-            fs::copy(torus(file), folder.path().join(pair).join(file)).unwrap();
-        }
-    }
+    two_pairs(&folder.path().join("many"));
     let output = run(folder.path(), &["replay", "many", "--no-pictures", "--timings", "--json"]);
     assert_eq!(json(std::str::from_utf8(&output.stdout).unwrap())["pairs"].as_array().unwrap().len(), 2);
     let told = String::from_utf8(output.stderr).unwrap();
