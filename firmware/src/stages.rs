@@ -6,9 +6,8 @@
 
 use core::fmt::{self, Write as _};
 use crc::{CRC_32_ISO_HDLC, Crc};
-use shared::arena::Arena;
-use shared::bitmap::{Bitmap, Grey};
-use shared::pipeline::{Finding, Memory, Observer, Outcome, Product, Run, Settings, Side};
+use shared::bitmap::Bitmap;
+use shared::pipeline::{Finding, Observer, Outcome, Product, Side};
 use shared::stage::branch::Sample;
 
 /// Counts instructions or cycles.
@@ -152,22 +151,4 @@ impl fmt::Write for Sum {
         self.0.update(text.as_bytes());
         Ok(())
     }
-}
-
-/// A run with room for one picture, and none for the right eye's skeleton.
-///
-/// # Errors
-/// What the core refuses.
-pub fn run(
-    memory: &mut Memory<'_>,
-    [left, right]: [Grey<'_>; 2],
-    settings: &Settings,
-    observer: &mut impl Observer,
-) -> Result<Outcome, Finding> {
-    let mut run = Run::new(memory, settings);
-    let [left_eye, right_eye] = &mut memory.eyes;
-    run.outline(Side::Left, left, left_eye, Arena::new(memory.scratch), observer)?;
-    run.skeleton(Side::Left, left_eye, Arena::new(memory.scratch), observer)?;
-    run.outline(Side::Right, right, right_eye, Arena::new(memory.scratch), observer)?;
-    run.pair(memory, observer)
 }

@@ -13,7 +13,7 @@ mod options;
 mod paper;
 mod workspace;
 
-pub use device::{describe, optics};
+pub use device::describe;
 pub(crate) use options::settings;
 pub use options::{Front, Mode, Options, Pieces, Profile, Radius, Skeleton};
 pub use workspace::{Seen, Workspace};

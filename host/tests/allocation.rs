@@ -1,7 +1,7 @@
 //! Once a workspace is warm, the stages of the core and of the host allocate nothing for another pair.
 
 use allocation_counter::measure;
-use host::calibration::{Distortion, StereoCamera};
+use host::calibration::{Lens, StereoCamera};
 use host::reconstruct::{Front, Mode, Options, Profile, Radius, Skeleton, Workspace};
 use host::render::render;
 use host::shape::Shape;
@@ -20,7 +20,7 @@ fn turned() -> StereoCamera {
     pair.translation = Vector3::new(-60.0, 1.0, 4.0);
     let mut lens = [0.0; 12];
     lens[0] = -0.1;
-    pair.left.distortion = Distortion::Polynomial(lens);
+    pair.left.lens = Lens::Polynomial(lens);
     pair
 }
 

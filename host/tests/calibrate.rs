@@ -8,7 +8,7 @@ use std::path::Path;
 use std::process::{Command as Process, Output};
 
 use assert_cmd::Command;
-use host::calibration::{Camera, Distortion, StereoCamera};
+use host::calibration::{Camera, Lens, StereoCamera};
 use image::{GrayImage, Luma};
 use nalgebra::{Point2, Rotation3, Vector3};
 use serde_json::Value;
@@ -31,8 +31,8 @@ fn cameras() -> StereoCamera {
     pair.rotation = Rotation3::from_euler_angles(0.01, 0.03, -0.008).into_inner();
     pair.translation = Vector3::new(-60.0, 0.7, 1.5);
     let lens =
-        |k1: f64, k2: f64| Distortion::Polynomial([k1, k2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
-    (pair.left.distortion, pair.right.distortion) = (lens(-0.12, 0.03), lens(-0.1, 0.02));
+        |k1: f64, k2: f64| Lens::Polynomial([k1, k2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    (pair.left.lens, pair.right.lens) = (lens(-0.12, 0.03), lens(-0.1, 0.02));
     pair
 }
 

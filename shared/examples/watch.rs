@@ -51,6 +51,10 @@ impl Observer for Log {
         };
         println!("{whose:>5}: {what}");
     }
+
+    fn wants_both_skeletons(&self) -> bool {
+        true
+    }
 }
 
 fn main() -> Result<(), String> {

@@ -19,12 +19,15 @@ use crate::bitmap::Size;
 use crate::fixed::PX;
 use crate::limits::MAX_SIDE;
 
-/// How a lens moves the image of a ray; normalised points, no unit.
+/// How a lens moves the image of a ray, in normalised points: where the ray (x, y, 1) meets the plane at distance
+/// 1, no unit. A tilted sensor (OpenCV's 14 coefficients) is not described.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Lens {
-    /// OpenCV's k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4.
+    /// OpenCV's k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4: plumb-bob is the first five, rational the first eight, thin
+    /// prism all twelve. Kalibr's `radtan` is the first four.
     Polynomial([f64; 12]),
-    /// k1..k4 of theta (1 + k1 theta^2 + k2 theta^4 + ..), theta the angle to the optical axis.
+    /// k1..k4 of theta (1 + k1 theta^2 + k2 theta^4 + ..), theta the angle to the optical axis: OpenCV's `fisheye`
+    /// and Kalibr's `equidistant`.
     Equidistant([f64; 4]),
 }
 
@@ -157,13 +160,13 @@ impl PairModel {
     }
 
     /// Focal length of both rectified eyes, 1/256 px.
-    pub fn fixed_focal(&self) -> i32 {
+    pub(crate) fn fixed_focal(&self) -> i32 {
         fixed(self.focal)
     }
 
     /// What is added to a disparity before Z = f B / d holds, 1/256 px: the right axis' column less the left
     /// one's.
-    pub fn fixed_disparity_offset(&self) -> i32 {
+    pub(crate) fn fixed_disparity_offset(&self) -> i32 {
         fixed(self.columns[1] - self.columns[0])
     }
 }
@@ -202,7 +205,11 @@ impl Mapping {
 }
 
 impl Lens {
+    /// That of a pinhole.
+    pub const NONE: Self = Self::Polynomial([0.0; 12]);
+
     /// Where the image of the ray (x, y, 1) comes to lie.
+    #[inline]
     pub fn bend(&self, ray: Vector2<f64>) -> Vector2<f64> {
         let (x, y) = (ray.x, ray.y);
         let r2 = x * x + y * y;
@@ -300,16 +307,14 @@ mod tests {
         }
     }
 
-    const PLAIN: Lens = Lens::Polynomial([0.0; 12]);
-
     #[test]
     fn numbers_that_cannot_be_are_refused() {
-        let good = pair(PLAIN);
+        let good = pair(Lens::NONE);
         assert_eq!(good.check(), Ok(()));
         let with = |change: &dyn Fn(&mut PairModel, &mut EyeModel)| {
-            let (mut pair, mut right) = (good, eye(PLAIN));
+            let (mut pair, mut right) = (good, eye(Lens::NONE));
             change(&mut pair, &mut right);
-            pair.eyes = Some([eye(PLAIN), right]);
+            pair.eyes = Some([eye(Lens::NONE), right]);
             pair.check().expect_err("a bad number")
         };
         for bad in [f64::NAN, f64::INFINITY, -1.0, 0.0] {
@@ -334,20 +339,23 @@ mod tests {
 
     #[test]
     fn a_plain_eye_is_a_change_of_scale() {
-        let [left, right] = pair(PLAIN).mappings().unwrap().unwrap();
+        let [left, right] = pair(Lens::NONE).mappings().unwrap().unwrap();
         let (x, y) = (50.0 / 290.0, -20.0 / 290.0);
         let expected = Vector2::new(300.0 * x + 0.5 * y + 160.0, 302.0 * y + 118.0);
         assert!((left.raw(Vector2::new(200.0, 100.0)) - expected).norm() < 1e-12);
         assert!((right.raw(Vector2::new(205.5, 100.0)) - expected).norm() < 1e-12);
-        assert_eq!((pair(PLAIN).fixed_focal(), pair(PLAIN).fixed_disparity_offset()), (290 * 256, 1408));
-        assert_eq!(PairModel { eyes: None, ..pair(PLAIN) }.mappings(), Ok(None));
+        assert_eq!(
+            (pair(Lens::NONE).fixed_focal(), pair(Lens::NONE).fixed_disparity_offset()),
+            (290 * 256, 1408)
+        );
+        assert_eq!(PairModel { eyes: None, ..pair(Lens::NONE) }.mappings(), Ok(None));
     }
 
     #[test]
     fn a_lens_that_turns_back_is_held_where_it_does() {
         // r (1 - r^2 / 3) is largest at r = 1.
         let lens = Lens::Polynomial([-1.0 / 3.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
-        assert_eq!((lens.reach(), PLAIN.reach(), Lens::Equidistant([0.0; 4]).reach()), (1.0, 6.0, 6.0));
+        assert_eq!((lens.reach(), Lens::NONE.reach(), Lens::Equidistant([0.0; 4]).reach()), (1.0, 6.0, 6.0));
         let [left, _] = pair(lens).mappings().unwrap().unwrap();
         for far in [440.0, 1000.0, 30000.0] {
             let held = left.raw(Vector2::new(far, 120.0));

@@ -11,7 +11,7 @@ use oracle::images::{Image, grey};
 use oracle::kernels;
 use plotters::prelude::*;
 use shared::bitmap::Bitmap;
-use shared::pipeline::{EyeMemory, Settings};
+use shared::pipeline::{EyeMemory, Settings, run};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
@@ -66,8 +66,8 @@ fn core_times(image: &Image, storage: &mut Storage) -> Times {
     let mut stages = Stages::new(Clock(Instant::now()), |record| {
         times.add(record.stage, f64::from(record.cost) / 1e6);
     });
-    let pair = image.pair.each_ref().map(grey);
-    firmware::stages::run(&mut storage.lend(), pair, &Settings::new(image.optics), &mut stages).unwrap();
+    let [left, right] = image.pair.each_ref().map(grey);
+    run(&mut storage.lend(), left, right, &Settings::new(image.optics), &mut stages).unwrap();
     times
 }
 
@@ -105,8 +105,8 @@ fn best_times(image: &Image) -> Times {
 fn described(image: &Image, count: fn(&EyeMemory<'_>) -> usize) -> f64 {
     let mut storage = Storage::new(image.size().width, image.size().height).unwrap();
     let mut memory = storage.lend();
-    let pair = image.pair.each_ref().map(grey);
-    firmware::stages::run(&mut memory, pair, &Settings::new(image.optics), &mut ()).unwrap();
+    let [left, right] = image.pair.each_ref().map(grey);
+    run(&mut memory, left, right, &Settings::new(image.optics), &mut ()).unwrap();
     count(&memory.eyes[0]) as f64
 }
 

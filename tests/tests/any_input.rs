@@ -8,7 +8,7 @@ use oracle::raster::Random;
 use shared::arena::Arena;
 use shared::bitmap::{Grey, Size, WORD_BITS};
 use shared::fixed::PX;
-use shared::pipeline::{Finding, Outcome, Run, Settings, Side};
+use shared::pipeline::{Finding, Observer, Outcome, Product, Run, Settings, Side, run};
 use shared::stage::binarise::{Polarity, Threshold};
 use shared::stage::correspond::PaperMatching;
 use shared::stage::depth::Optics;
@@ -134,6 +134,43 @@ fn hand(shift: usize) -> Picture {
         let hole = (84..96).contains(&v) && u % 20 < 10 && (40..110).contains(&u);
         if (finger || palm) && !hole { 210 } else { 12 }
     })
+}
+
+/// Counts the skeletons that it sees.
+struct Onlooker {
+    curious: bool,
+    seen: usize,
+}
+
+impl Observer for Onlooker {
+    fn saw(&mut self, _: Option<Side>, product: Product<'_>) {
+        self.seen += usize::from(matches!(product, Product::Graph(..)));
+    }
+
+    fn wants_both_skeletons(&self) -> bool {
+        self.curious
+    }
+}
+
+/// The right eye's skeleton is of no use to the default method: neither that somebody looks at it nor that there is no
+/// room for it changes what comes out.
+#[test]
+fn looking_on_changes_nothing() {
+    let mut core = Core::default();
+    let pair = [hand(0), hand(9)].map(|picture| picture.concat());
+    let size = Size::new(150, 120).unwrap();
+    let [left, right] = pair.each_ref().map(|bytes| Grey::new(size, size.width, bytes).unwrap());
+    let made = [(false, true), (true, true), (true, false)].map(|(curious, room)| {
+        let (mut none, mut onlooker) = (heapless::Vec::<_, 1>::new(), Onlooker { curious, seen: 0 });
+        let mut memory = core.lend(size, "");
+        if !room {
+            memory.eyes[1].graph.nodes = &mut none;
+        }
+        let outcome = run(&mut memory, left, right, &Settings::new(OPTICS), &mut onlooker).unwrap();
+        (format!("{outcome:?}{:?}{:?}", memory.depths, memory.eyes[0].controls), onlooker.seen)
+    });
+    assert_eq!(made.each_ref().map(|(_, seen)| *seen), [1, 2, 1]);
+    assert!(made.iter().all(|(what, _)| *what == made[0].0));
 }
 
 #[test]

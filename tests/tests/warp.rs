@@ -4,7 +4,7 @@
 //! `REGENERATE=1 cargo test -p system-tests --test warp` writes the frozen checksums anew;
 //! `-- --nocapture` prints the figures.
 
-use host::calibration::{Camera, Distortion, StereoCamera};
+use host::calibration::{Camera, Lens, StereoCamera};
 use host::stage::rectify::{Eye, Rectification, RectifiedCamera, RectifyError};
 use image::{GrayImage, Luma};
 use nalgebra::{Point2, Rotation3, Vector2, Vector3};
@@ -16,8 +16,8 @@ use shared::stage::warp::{Place, Warp, knots};
 use std::fmt::Write as _;
 
 /// Lenses of modules with 320 columns: what they are, their focal length in px, and how they bend.
-const LENSES: [(&str, f64, Distortion); 7] = [
-    ("pinhole", 300.0, Distortion::NONE),
+const LENSES: [(&str, f64, Lens); 7] = [
+    ("pinhole", 300.0, Lens::NONE),
     ("barrel", 300.0, polynomial([-0.3, 0.1, 1e-3, -5e-4, -0.01])),
     ("strong barrel", 240.0, polynomial([-0.4, 0.2, 2e-3, 1e-3, -0.04])),
     ("k1 alone", 300.0, polynomial([-0.3, 0.0, 0.0, 0.0, 0.0])),
@@ -25,21 +25,21 @@ const LENSES: [(&str, f64, Distortion); 7] = [
     (
         "rational",
         250.0,
-        Distortion::Polynomial([0.3, -0.05, 1e-3, 5e-4, 0.01, 0.6, 0.05, -0.01, 1e-3, -2e-4, -1e-3, 1e-4]),
+        Lens::Polynomial([0.3, -0.05, 1e-3, 5e-4, 0.01, 0.6, 0.05, -0.01, 1e-3, -2e-4, -1e-3, 1e-4]),
     ),
-    ("fisheye, 90 degrees", 200.0, Distortion::Equidistant([0.02, -0.01, 0.003, -5e-4])),
+    ("fisheye, 90 degrees", 200.0, Lens::Equidistant([0.02, -0.01, 0.003, -5e-4])),
 ];
 /// Degrees by which the cameras are turned towards one another, tilted and rolled.
 const TURNS: [[f64; 3]; 4] = [[0.0, 0.0, 0.0], [5.0, 0.5, -0.7], [10.0, -2.0, 2.0], [-3.0, 1.0, 4.0]];
 
-const fn polynomial([k1, k2, p1, p2, k3]: [f64; 5]) -> Distortion {
-    Distortion::Polynomial([k1, k2, p1, p2, k3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+const fn polynomial([k1, k2, p1, p2, k3]: [f64; 5]) -> Lens {
+    Lens::Polynomial([k1, k2, p1, p2, k3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 }
 
 /// Two modules of 320 x 240 px, 60 mm apart, neither quite like the other.
-fn pair(f: f64, distortion: Distortion, [verging, tilt, roll]: [f64; 3]) -> StereoCamera {
+fn pair(f: f64, lens: Lens, [verging, tilt, roll]: [f64; 3]) -> StereoCamera {
     let left =
-        Camera { width: 320, height: 240, fx: f, fy: f * 1.005, cx: 163.3, cy: 117.2, skew: 0.0, distortion };
+        Camera { width: 320, height: 240, fx: f, fy: f * 1.005, cx: 163.3, cy: 117.2, skew: 0.0, lens };
     let right = Camera { fx: f * 0.99, cx: 156.0, cy: 121.5, skew: 0.3, ..left };
     let turn = Rotation3::from_euler_angles(tilt.to_radians(), verging.to_radians(), roll.to_radians());
     StereoCamera {
@@ -70,8 +70,8 @@ fn picture() -> GrayImage {
     })
 }
 
-/// The camera model is that of the calibration reader, which shares no code with it: what a raw pixel sees
-/// is seen there again.
+/// What a raw pixel sees, by the inverse of its lens, is seen there again. The lens itself is held against OpenCV's
+/// formulas where calibrations are read (`host/src/calibration/tests.rs`).
 #[test]
 fn the_mapping_is_the_inverse_of_the_hosts() {
     for (name, turn, pair) in population() {
@@ -225,7 +225,7 @@ fn what_a_device_cannot_take_is_refused() {
     let images = || GrayImage::new(5000, 240);
     let refused = rectification.device_images(images(), images());
     assert!(matches!(refused, Err(RectifyError::Device(CameraError::Size))));
-    let crossed = pair(1000.0, Distortion::NONE, [0.0, 25.0, 0.0]);
+    let crossed = pair(1000.0, Lens::NONE, [0.0, 25.0, 0.0]);
     assert!(matches!(Rectification::same_size(&crossed), Err(RectifyError::Apart)));
     assert!(Warp::along(Size::new(320, 240).unwrap(), &[[0; 2]; 413]).is_err());
 }

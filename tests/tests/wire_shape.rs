@@ -208,7 +208,7 @@ fn every_case_fits_a_frame() {
         let rectification = Rectification::same_size(&camera).unwrap();
         let model = rectification.model();
         let pair = rectification.device_images(left, right).unwrap();
-        let optics = Optics { focal: model.fixed_focal(), disparity_offset: model.fixed_disparity_offset() };
+        let optics = Optics::from(&model);
         let figures = |s: Shape<'_>| (bytes(&report(Ok(s))).len(), s.contour.len(), s.branches.len());
         let (len, points, branches) = describe(&pair, optics, figures).unwrap();
         println!("{name:12} {points:4} contour points, {branches:2} branches: {len} bytes");

@@ -12,12 +12,12 @@
 mod board {
     use firmware::board::mps2::{Board, Timer, argument};
     use firmware::memory::{Capacities, Qvga, Small, Storage, Vga};
-    use firmware::stages::{Stages, run};
+    use firmware::stages::Stages;
     use semihosting::fs::File;
     use semihosting::io::Read;
     use semihosting::{println, process};
     use shared::bitmap::{Grey, Size};
-    use shared::pipeline::{Memory, Settings, scratch_words};
+    use shared::pipeline::{Memory, Settings, run, scratch_words};
     use shared::stage::depth::Optics;
     use shared::stage::sequential_thinning::scratch_order;
     use static_cell::ConstStaticCell;
@@ -61,9 +61,15 @@ mod board {
         if header.as_device { Settings::device(header.optics) } else { Settings::new(header.optics) }
     }
 
-    fn observe(number: usize, memory: &mut Memory<'_>, pair: [Grey<'_>; 2], header: &Header, timer: &Timer) {
+    fn observe(
+        number: usize,
+        memory: &mut Memory<'_>,
+        [left, right]: [Grey<'_>; 2],
+        header: &Header,
+        timer: &Timer,
+    ) {
         let mut stages = Stages::new(timer, |record| println!("{number} {record} {}", record.cost));
-        let outcome = run(memory, pair, &settings(header), &mut stages);
+        let outcome = run(memory, left, right, &settings(header), &mut stages);
         stages.ended(&outcome, memory.eyes[0].samples);
     }
 

@@ -48,7 +48,7 @@ impl<'m> Calibration<'m> {
         for (mapping, table) in mappings.iter().flatten().zip(&mut self.tables) {
             Warp::new(mapping, table).map_err(|_| ErrorCode::OutOfRange)?;
         }
-        let optics = Optics { focal: model.fixed_focal(), disparity_offset: model.fixed_disparity_offset() };
+        let optics = Optics::from(model);
         self.known = Some(Known { crc: calibration_crc(model), optics, warped: mappings.is_some() });
         Ok(())
     }

@@ -5,7 +5,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::yaml::Field;
-use super::{CalibrationError, Camera, Distortion, StereoCamera, opencv, rotation_near};
+use super::{CalibrationError, Camera, Lens, StereoCamera, opencv, rotation_near};
 
 const MM_PER_METRE: f64 = 1000.0;
 
@@ -44,16 +44,16 @@ fn camera(root: Field<'_>) -> Result<Camera, CalibrationError> {
     Camera::new((width.side()?, height.side()?), &matrix, distortion(root)?, intrinsics)
 }
 
-fn distortion(root: Field<'_>) -> Result<Distortion, CalibrationError> {
+fn distortion(root: Field<'_>) -> Result<Lens, CalibrationError> {
     let model = root.get(&["distortion_model"])?;
     let name = model.text()?;
     if name == "none" {
-        return Ok(Distortion::NONE);
+        return Ok(Lens::NONE);
     }
     let coefficients = root.get(&["distortion_coeffs"])?;
     match name {
         "radtan" => opencv::polynomial(&coefficients.array::<4>()?, coefficients),
-        "equidistant" => Ok(Distortion::Equidistant(coefficients.array()?)),
+        "equidistant" => Ok(Lens::Equidistant(coefficients.array()?)),
         other => Err(CalibrationError::Lens {
             place: model.place(),
             model: other.into(),

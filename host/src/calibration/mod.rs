@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Matrix3, Point2, Rotation3, UnitQuaternion, Vector3};
 
 pub use error::{CalibrationError, Place};
-pub use lens::Distortion;
+pub use shared::camera::Lens;
 use yaml::{Document, Field};
 
 /// A calibration has some kilobytes; a file beyond this is something else, and is not read to its end.
@@ -53,7 +53,7 @@ pub struct Camera {
     /// Columns that a row further down is moved by, times `fy`: 0 for every ordinary sensor.
     pub skew: f64,
     /// What the lens does.
-    pub distortion: Distortion,
+    pub lens: Lens,
 }
 
 impl Camera {
@@ -61,17 +61,17 @@ impl Camera {
     #[must_use]
     #[inline]
     pub fn pixel_of(&self, ray: Point2<f64>) -> Point2<f64> {
-        let p = self.distortion.apply(ray);
+        let p = self.lens.bend(ray.coords);
         Point2::new(self.fx * p.x + self.skew * p.y + self.cx, self.fy * p.y + self.cy)
     }
 
     /// The ray (x, y, 1) that a pixel sees; nothing where the lens model cannot be inverted, see
-    /// [`Distortion::remove`].
+    /// [`unbend`](lens::unbend).
     #[must_use]
     pub fn ray_of(&self, pixel: Point2<f64>) -> Option<Point2<f64>> {
         let y = (pixel.y - self.cy) / self.fy;
         let x = (pixel.x - self.cx - self.skew * y) / self.fx;
-        self.distortion.remove(Point2::new(x, y))
+        lens::unbend(&self.lens, Point2::new(x, y))
     }
 
     /// Holds an image of `width` x `height` px against the calibration.
@@ -97,7 +97,7 @@ impl Camera {
             cx: halfway(self.cx),
             cy: halfway(self.cy),
             skew: self.skew / 2.0,
-            distortion: self.distortion,
+            lens: self.lens,
         }
     }
 
@@ -105,7 +105,7 @@ impl Camera {
     fn new(
         (width, height): (u32, u32),
         matrix: &Matrix3<f64>,
-        distortion: Distortion,
+        lens: Lens,
         source: Field<'_>,
     ) -> Result<Self, CalibrationError> {
         let (fx, fy) = (matrix.m11, matrix.m22);
@@ -113,7 +113,7 @@ impl Camera {
         if !(fx > 0.0 && fy > 0.0) || below != [0.0; 4] {
             return Err(source.singular());
         }
-        Ok(Self { width, height, fx, fy, cx: matrix.m13, cy: matrix.m23, skew: matrix.m12, distortion })
+        Ok(Self { width, height, fx, fy, cx: matrix.m13, cy: matrix.m23, skew: matrix.m12, lens })
     }
 }
 
@@ -144,7 +144,7 @@ impl StereoCamera {
             cx: centre(width),
             cy: centre(height),
             skew: 0.0,
-            distortion: Distortion::NONE,
+            lens: Lens::NONE,
         };
         Self {
             left: camera,

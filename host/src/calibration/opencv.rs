@@ -9,7 +9,7 @@ use std::path::Path;
 use nalgebra::Vector3;
 
 use super::yaml::Field;
-use super::{CalibrationError, Camera, Distortion, StereoCamera, rotation_near};
+use super::{CalibrationError, Camera, Lens, StereoCamera, rotation_near};
 use crate::unfinished;
 
 /// Synonyms of the camera matrices and distortions, left and right.
@@ -65,7 +65,7 @@ pub(super) fn format(pair: &StereoCamera) -> Result<String, CalibrationError> {
     if (left.width, left.height) != (right.width, right.height) {
         return Err(CalibrationError::Inexpressible { reason: "the images of the eyes differ in size" });
     }
-    let (Distortion::Polynomial(d1), Distortion::Polynomial(d2)) = (left.distortion, right.distortion) else {
+    let (Lens::Polynomial(d1), Lens::Polynomial(d2)) = (left.lens, right.lens) else {
         return Err(CalibrationError::Inexpressible { reason: "a lens is equidistant (fisheye)" });
     };
     let matrix = |key, rows, cols, data: &[f64]| {
@@ -91,7 +91,7 @@ fn pair_of_sides(size: Field<'_>) -> Result<(u32, u32), CalibrationError> {
     }
 }
 
-fn distortion(source: Field<'_>) -> Result<Distortion, CalibrationError> {
+fn distortion(source: Field<'_>) -> Result<Lens, CalibrationError> {
     let (data, (rows, cols)) = source.matrix()?;
     if rows > 1 && cols > 1 {
         return Err(source.should_be("one row or one column of coefficients"));
@@ -100,7 +100,7 @@ fn distortion(source: Field<'_>) -> Result<Distortion, CalibrationError> {
 }
 
 /// The lens of 0, 4, 5, 8 or 12 coefficients in OpenCV's order, or of 14 whose tilt is 0.
-pub(super) fn polynomial(data: &[f64], source: Field<'_>) -> Result<Distortion, CalibrationError> {
+pub(super) fn polynomial(data: &[f64], source: Field<'_>) -> Result<Lens, CalibrationError> {
     let (bent, tilt) = data.split_at(data.len().min(12));
     if !matches!(data.len(), 0 | 4 | 5 | 8 | 12 | 14) {
         return Err(source.should_be(&format!("0, 4, 5, 8 or 12 coefficients, not {}", data.len())));
@@ -114,5 +114,5 @@ pub(super) fn polynomial(data: &[f64], source: Field<'_>) -> Result<Distortion, 
     }
     let mut k = [0.0; 12];
     k[..bent.len()].copy_from_slice(bent);
-    Ok(Distortion::Polynomial(k))
+    Ok(Lens::Polynomial(k))
 }

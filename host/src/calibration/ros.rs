@@ -7,7 +7,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::yaml::Field;
-use super::{CalibrationError, Camera, Distortion, StereoCamera, opencv, rotation_near};
+use super::{CalibrationError, Camera, Lens, StereoCamera, opencv, rotation_near};
 
 const MM_PER_METRE: f64 = 1000.0;
 
@@ -40,7 +40,7 @@ fn eye(root: Field<'_>) -> Result<(Camera, Matrix3<f64>, Vector3<f64>), Calibrat
     Ok((camera, rotation_near(&turn.matrix3()?, turn)?, Vector3::new(tx / fx, ty / fy, 0.0)))
 }
 
-fn distortion(root: Field<'_>) -> Result<Distortion, CalibrationError> {
+fn distortion(root: Field<'_>) -> Result<Lens, CalibrationError> {
     let model = root.get(&["distortion_model"])?;
     let coefficients = root.get(&["distortion_coefficients"])?;
     let (data, _) = coefficients.matrix()?;
@@ -48,7 +48,7 @@ fn distortion(root: Field<'_>) -> Result<Distortion, CalibrationError> {
         "plumb_bob" | "rational_polynomial" | "thin_prism" => opencv::polynomial(&data, coefficients),
         "equidistant" | "fisheye" => data
             .try_into()
-            .map(Distortion::Equidistant)
+            .map(Lens::Equidistant)
             .map_err(|_| coefficients.should_be("4 coefficients for this model")),
         other => Err(CalibrationError::Lens {
             place: model.place(),

@@ -7,17 +7,9 @@ use crate::calibration::StereoCamera;
 use crate::memory::Storage;
 use crate::stage::rectify::Rectification;
 use image::GrayImage;
-use shared::arena::Arena;
 use shared::camera::PairModel;
-use shared::pipeline::{Finding, Memory, Observer, Outcome, Product, Run, Settings, Side};
-use shared::stage::depth::Optics;
+use shared::pipeline::{Finding, Observer, Product, Side, run};
 use shared::wire::{Exposure, MAX_FRAME, PairReport, Shape, ToHost};
-
-/// What the core has to know of a device's cameras.
-#[must_use]
-pub fn optics(model: &PairModel) -> Optics {
-    Optics { focal: model.fixed_focal(), disparity_offset: model.fixed_disparity_offset() }
-}
 
 /// The device's model of a calibration, and the frame that a device of this calibration sends of a pair of raw
 /// pictures, whether its core describes or refuses them.
@@ -35,13 +27,14 @@ pub fn describe(
     let rectification = Rectification::same_size(calibration)?;
     let images = rectification.device_images(left, right)?;
     let model = rectification.model();
-    let settings = core_settings(optics(&model), options);
+    let settings = core_settings((&model).into(), options);
 
     let (width, height) = images[0].dimensions();
     let mut storage = Storage::new(width as usize, height as usize).map_err(Finding::from)?;
     let mut memory = storage.lend();
     let mut levels = Levels::default();
-    let outcome = run(&mut memory, &images, &settings, &mut levels);
+    let [left, right] = images.each_ref().map(grey);
+    let outcome = run(&mut memory, left?, right?, &settings, &mut levels);
     let report = ToHost::Pair(PairReport {
         number: 0,
         stamps: [0; 2],
@@ -53,23 +46,6 @@ pub fn describe(
     let length = report.encode(0, &mut frame).map_err(Finding::from)?;
     frame.truncate(length);
     Ok((model, frame))
-}
-
-/// A run as a device goes it, which has room for one picture: the outlines first, and no skeleton of the right
-/// eye.
-fn run(
-    memory: &mut Memory<'_>,
-    images: &[GrayImage; 2],
-    settings: &Settings,
-    observer: &mut impl Observer,
-) -> Result<Outcome, Finding> {
-    let mut run = Run::new(memory, settings);
-    for (side, image) in [Side::Left, Side::Right].into_iter().zip(images) {
-        let eye = &mut memory.eyes[side as usize];
-        run.outline(side, grey(image)?, eye, Arena::new(memory.scratch), observer)?;
-    }
-    run.skeleton(Side::Left, &mut memory.eyes[0], Arena::new(memory.scratch), observer)?;
-    run.pair(memory, observer)
 }
 
 /// Keeps the levels between object and background.

@@ -2,7 +2,7 @@
 
 use super::grow::Described;
 use super::options::{core_settings, settings};
-use super::{Clock, Front, Growth, Mode, Options, Reconstruction, Refusal, Unmeasured, grey, optics};
+use super::{Clock, Front, Growth, Mode, Options, Reconstruction, Refusal, Unmeasured, grey};
 use crate::calibration::StereoCamera;
 use crate::memory::Storage;
 use crate::mesh::Mesh;
@@ -101,7 +101,7 @@ impl Workspace {
     ) -> Result<Reconstruction, Refusal> {
         self.clock.start();
         model.check().map_err(RectifyError::from)?;
-        pipeline::resume(memory, &outcome, optics(model), observer).map_err(Finding::from)?;
+        pipeline::resume(memory, &outcome, model.into(), observer).map_err(Finding::from)?;
         self.clock.lap("core");
         let solid = Solid { outcome, camera: model.into(), resampled: model.eyes.is_some() };
         grow(&mut self.growth, memory, &solid, options, &mut self.clock)?;
@@ -132,7 +132,7 @@ impl Workspace {
             let threshold = Threshold::Fixed(seen.levels[side as usize]);
             // The level is told, but not on which side of it the object is.
             let found = [Polarity::BrightObject, Polarity::DarkObject].into_iter().any(|polarity| {
-                let settings = Settings { threshold, polarity, ..core_settings(optics(model), options) };
+                let settings = Settings { threshold, polarity, ..core_settings(model.into(), options) };
                 let (image, storage) = (&images[side as usize], &mut self.storage);
                 object_box(image, side, &settings, storage).is_ok()
                     && storage.masks().is_ok_and(|masks| {

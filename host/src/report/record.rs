@@ -201,6 +201,11 @@ impl Observer for Record {
         self.pair.keep(&product);
         self.last = Instant::now();
     }
+
+    /// Reports and pictures show both views.
+    fn wants_both_skeletons(&self) -> bool {
+        true
+    }
 }
 
 /// The name under which a product's time is reported.

@@ -37,7 +37,7 @@ use nalgebra::{Matrix3, Point2, Point3, Rotation3, Vector3};
 use shared::camera::CameraError;
 use shared::limits::CapacityError;
 
-use crate::calibration::{CalibrationError, Camera, StereoCamera};
+use crate::calibration::{CalibrationError, Camera, Lens, StereoCamera};
 use canvas::Canvas;
 pub use device::device_images;
 
@@ -373,7 +373,7 @@ fn already_rectified(pair: &StereoCamera) -> Option<RectifiedCamera> {
         && near(left.fx, right.fy)
         && near(left.cy, right.cy)
         && (left.width, left.height) == (right.width, right.height);
-    let pinholes = [left, right].iter().all(|eye| near(eye.skew, 0.0) && eye.distortion.is_none());
+    let pinholes = [left, right].iter().all(|eye| near(eye.skew, 0.0) && eye.lens == Lens::NONE);
     (aligned && same && pinholes).then_some(RectifiedCamera {
         width: left.width,
         height: left.height,

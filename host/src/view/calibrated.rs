@@ -53,7 +53,7 @@ impl View for Calibrated {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibration::Distortion;
+    use crate::calibration::Lens;
     use crate::view::Pinhole;
     use nalgebra::Rotation3;
 
@@ -77,8 +77,7 @@ mod tests {
         let mut pair = StereoCamera::rectified(640, 480, 750.0, 60.0);
         pair.rotation = Rotation3::from_euler_angles(0.01, 0.12, -0.02).into_inner();
         pair.translation = Vector3::new(-60.0, 2.0, 5.0);
-        pair.right.distortion =
-            Distortion::Polynomial([-0.2, 0.05, 1e-3, -5e-4, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        pair.right.lens = Lens::Polynomial([-0.2, 0.05, 1e-3, -5e-4, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
         for view in Calibrated::pair(&pair) {
             let point = view.centre() + 400.0 * view.ray(100.25, 400.5);
             let (u, v) = view.project(&point).expect("the point is in front");

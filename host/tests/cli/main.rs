@@ -6,7 +6,7 @@ use std::process::{Output, Stdio};
 use std::sync::LazyLock;
 
 use assert_cmd::Command;
-use host::calibration::{Distortion, StereoCamera};
+use host::calibration::{Lens, StereoCamera};
 use host::mesh::Mesh;
 use host::shape::Shape;
 use nalgebra::{Rotation3, Vector3};

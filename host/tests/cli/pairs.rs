@@ -110,13 +110,13 @@ fn timings_are_a_row_a_stage_beside_the_results() {
     let (last, rows) = lines[1..].split_last().unwrap();
     assert!(last.starts_with("2 pairs in ") && last.ends_with(" a second"), "{told}");
     let names: Vec<&str> = rows.iter().map(|row| row[..22].trim()).collect();
-    let eye = |side| {
-        ["threshold", "mask", "boundary", "contour", "distance", "thinning", "graph"]
-            .map(|s| format!("{side} {s}"))
-    };
+    let eye = |side, stages: &[&str]| stages.iter().map(|s| format!("{side} {s}")).collect::<Vec<_>>();
+    let outline = ["threshold", "mask", "boundary", "contour"];
+    let skeleton = ["distance", "thinning", "graph"];
     let expected = [
         ["load", "rectify"].map(String::from).to_vec(),
-        [eye("left"), eye("right")].concat(),
+        [eye("left", &outline), eye("right", &outline)].concat(),
+        [eye("left", &skeleton), eye("right", &skeleton)].concat(),
         ["left hull", "right hull", "pair correspondence", "pair rows", "pair balls", "pair curves"]
             .map(String::from)
             .to_vec(),

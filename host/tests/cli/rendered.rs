@@ -81,10 +81,8 @@ fn turned_cameras_with_lenses_give_the_same_shape() {
     let mut pair = StereoCamera::rectified(320, 240, 375.0, 60.0);
     pair.rotation = Rotation3::from_euler_angles(0.01, 0.1, -0.01).into_inner();
     pair.translation = Vector3::new(-60.0, 1.0, 4.0);
-    pair.left.distortion =
-        Distortion::Polynomial([-0.2, 0.05, 1e-3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
-    pair.right.distortion =
-        Distortion::Polynomial([-0.18, 0.04, 0.0, 5e-4, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    pair.left.lens = Lens::Polynomial([-0.2, 0.05, 1e-3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    pair.right.lens = Lens::Polynomial([-0.18, 0.04, 0.0, 5e-4, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
     pair.write_opencv_yaml(folder.path().join("turned.yaml")).unwrap();
     good(folder.path(), &["render", "torus", "--place", "auto", "--calib", "turned.yaml", "--out", "pair"]);
     let error = error_of(folder.path(), "pair");

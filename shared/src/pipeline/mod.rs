@@ -147,7 +147,8 @@ pub struct Outcome {
     pub rows: RowStatistics,
 }
 
-/// Describe and match one rectified pair.
+/// Describe and match one rectified pair. The right eye is thinned for the paper's method, and for an observer that
+/// wants to see it ([`Observer::wants_both_skeletons`]), on whom nothing that comes out depends.
 ///
 /// # Errors
 /// The first [`Finding`] that refuses; with [`Method::Paper`] only one that leaves nothing to go on with.
@@ -160,19 +161,25 @@ pub fn run(
 ) -> Result<Outcome, Finding> {
     let mut run = Run::new(memory, settings);
     same_size(left.size(), right.size())?;
-    let mut see = |side: Side, grey| {
-        let eye = &mut memory.eyes[side as usize];
-        run.outline(side, grey, eye, Arena::new(memory.scratch), observer)?;
-        run.skeleton(side, eye, Arena::new(memory.scratch), observer)
-    };
-    see(Side::Left, left)?;
-    see(Side::Right, right)?;
+    let [left_eye, right_eye] = &mut memory.eyes;
+    let mut scratch = Arena::new(memory.scratch);
+    run.outline(Side::Left, left, left_eye, scratch.fork(), observer)?;
+    run.outline(Side::Right, right, right_eye, scratch.fork(), observer)?;
+    run.skeleton(Side::Left, left_eye, scratch.fork(), observer)?;
+    match settings.method {
+        Method::Paper(_) => run.skeleton(Side::Right, right_eye, scratch, observer)?,
+        Method::Default if observer.wants_both_skeletons() => {
+            // A copy, whose findings and lack of memory are none of the pair's.
+            let _ = run.clone().skeleton(Side::Right, right_eye, scratch, observer);
+        }
+        Method::Default => (),
+    }
     run.pair(memory, observer)
 }
 
-/// A run in its steps, for a device that has room for but one picture at a time: outline and skeleton of
-/// the left eye, then of the right one, then the pair.
-#[derive(Debug)]
+/// A run in its steps, for a device that has room for but one picture at a time: the outlines of both eyes, the
+/// left one's skeleton, then the pair. [`run`] goes the same steps.
+#[derive(Clone, Debug)]
 pub struct Run {
     settings: Settings,
     kernels: Kernels,
@@ -206,8 +213,7 @@ impl Run {
         Ok(())
     }
 
-    /// From an eye's mask to its skeleton. The right eye's is but looked at, unless the method is the
-    /// paper's: without it the same shape comes out.
+    /// From an eye's mask to its skeleton. The pair needs the right eye's in the paper's method alone.
     ///
     /// # Errors
     /// The first [`Finding`] that refuses.

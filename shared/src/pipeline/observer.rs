@@ -53,6 +53,11 @@ pub enum Product<'a> {
 pub trait Observer {
     /// A stage has made something; products of the pair come with `None`.
     fn saw(&mut self, side: Option<Side>, product: Product<'_>);
+
+    /// Whether the right eye is to be thinned for it, though the default method has no use for that.
+    fn wants_both_skeletons(&self) -> bool {
+        false
+    }
 }
 
 /// Nobody looks on.

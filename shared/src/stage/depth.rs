@@ -17,6 +17,7 @@
 //! * **Bounds**: radii below 2^21 (`medial`), disparities of matches below 2^31, the offset at most 2^20. A ball's
 //!   disparity is brought to +-2^20: what a plane says far from what it was fitted to may be more.
 
+use crate::camera::PairModel;
 use crate::fixed::{PX, UNIT, div_round};
 use crate::limits::{CapacityError, MAX_SIDE, push};
 use crate::stage::contour::ContourPoint;
@@ -32,6 +33,13 @@ pub struct Optics {
     /// What is added to a disparity before Z = f B / d holds, 1/256 px: the right principal point's column
     /// less the left one's; at most 2^20 either way.
     pub disparity_offset: i32,
+}
+
+impl From<&PairModel> for Optics {
+    /// Those of a model that passes its check.
+    fn from(model: &PairModel) -> Self {
+        Self { focal: model.fixed_focal(), disparity_offset: model.fixed_disparity_offset() }
+    }
 }
 
 /// The disparity of a ball's centre.

@@ -128,7 +128,7 @@ pub fn rectified([left, right]: &Pair, camera: &StereoCamera) -> (Pair, Optics) 
     let rectification = Rectification::same_size(camera).unwrap();
     let model = rectification.model();
     let pair = rectification.device_images(left.clone(), right.clone()).unwrap();
-    (pair, Optics { focal: model.fixed_focal(), disparity_offset: model.fixed_disparity_offset() })
+    (pair, Optics::from(&model))
 }
 
 /// Width and height of a picture.

@@ -1,6 +1,6 @@
 //! Pairs of pictures of the built-in shapes, rendered once, and pairs that are drawn.
 
-use host::calibration::{Camera, Distortion, StereoCamera};
+use host::calibration::{Camera, Lens, StereoCamera};
 use host::reconstruct::{Options, Reconstruction, Refusal, reconstruct};
 use host::render::render;
 use host::shape::Shape;
@@ -25,13 +25,13 @@ pub fn camera(scale: Scale) -> StereoCamera {
 /// is turned.
 pub fn bent_camera(scale: Scale) -> StereoCamera {
     let straight = camera(scale);
-    let mut lens = [0.0; 12];
-    lens[0] = -0.02;
-    let distortion = Distortion::Polynomial(lens);
+    let mut k = [0.0; 12];
+    k[0] = -0.02;
+    let lens = Lens::Polynomial(k);
     let turn = Rotation3::from_euler_angles(0.0, 0.004, 0.0);
     StereoCamera {
-        left: Camera { distortion, ..straight.left },
-        right: Camera { distortion, ..straight.right },
+        left: Camera { lens, ..straight.left },
+        right: Camera { lens, ..straight.right },
         rotation: turn.into_inner(),
         translation: turn * straight.translation,
     }

@@ -3,7 +3,7 @@
 use crate::core::Core;
 use crate::emulated::Case;
 use firmware::memory::{Qvga, Small, Storage as _, Vga};
-use firmware::stages::{Stages, run};
+use firmware::stages::Stages;
 use host::calibration::StereoCamera;
 use host::memory::Storage;
 use host::mesh::Mesh;
@@ -12,7 +12,7 @@ use image::GrayImage;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use shared::bitmap::{Grey, Size};
 use shared::fixed::PX;
-use shared::pipeline::{self, Finding, Memory, Side, scratch_words};
+use shared::pipeline::{Finding, Memory, run, scratch_words};
 use shared::stage::sequential_thinning::scratch_order;
 
 /// FNV-1a, 64 bits.
@@ -26,25 +26,20 @@ pub fn mesh_checksum(mesh: &Mesh) -> u64 {
     checksum(vertices.chain(mesh.faces.iter().flatten().flat_map(|i| i.to_le_bytes())))
 }
 
-/// What the PC makes of a case in memory without bounds, both pictures at once: a line a stage.
+/// What the PC makes of a case in memory without bounds: a line a stage.
 pub fn on_the_pc(core: &mut Core, case: &Case) -> Vec<String> {
-    let pair = case.pair.each_ref().map(grey);
-    at_once(&mut core.lend(pair[0].size(), ""), pair, case)
+    let size = grey(&case.pair[0]).size();
+    stages(&mut core.lend(size, ""), case).0
 }
 
-/// A run of both pictures at once: a line a stage, but for those of the right eye that a device leaves out.
-fn at_once(memory: &mut Memory<'_>, [left, right]: [Grey<'_>; 2], case: &Case) -> Vec<String> {
+/// A run of a case in this memory: a line a stage, and whether the memory is too short.
+fn stages(memory: &mut Memory<'_>, case: &Case) -> (Vec<String>, bool) {
+    let [left, right] = case.pair.each_ref().map(grey);
     let mut lines = Vec::new();
-    let skeleton =
-        |side, stage| side == Some(Side::Right) && ["distance", "skeleton", "graph"].contains(&stage);
-    let mut stages = Stages::new((), |record| {
-        if !skeleton(record.side, record.stage) {
-            lines.push(record.to_string());
-        }
-    });
-    let outcome = pipeline::run(memory, left, right, &case.settings(), &mut stages);
+    let mut stages = Stages::new((), |record| lines.push(record.to_string()));
+    let outcome = run(memory, left, right, &case.settings(), &mut stages);
     stages.ended(&outcome, memory.eyes[0].samples);
-    lines
+    (lines, matches!(outcome, Err(Finding::Capacity(_))))
 }
 
 fn grey(image: &GrayImage) -> Grey<'_> {
@@ -87,30 +82,24 @@ impl Default for Bench {
 }
 
 impl Bench {
-    /// What a board has to say of a case: its memory, one picture after the other, a line a stage; and whether its memory
-    /// is too short, of which the last line tells by how much: that depends on the width of a word.
+    /// What a board has to say of a case: a line a stage in its memory; and whether that is too short, of which the last
+    /// line tells by how much: that depends on the width of a word.
     pub fn as_a_board(&mut self, case: &Case) -> (Vec<String>, bool) {
-        let [left, right] = case.pair.each_ref().map(grey);
-        let size = left.size();
+        let size = grey(&case.pair[0]).size();
         let fits = |c: Size| size.width <= c.width && size.height <= c.height;
         let mut memory = if fits(Small::CAPACITIES.size) { self.small.lend() } else { self.qvga.lend() };
         assert!(fits(Qvga::CAPACITIES.size), "no case is larger");
         if !case.as_device {
             memory.scratch = &mut self.scratch;
         }
-        let mut lines = Vec::new();
-        let mut stages = Stages::new((), |record| lines.push(record.to_string()));
-        let outcome = run(&mut memory, [left, right], &case.settings(), &mut stages);
-        stages.ended(&outcome, memory.eyes[0].samples);
-        (lines, matches!(outcome, Err(Finding::Capacity(_))))
+        stages(&mut memory, case)
     }
 
     /// What the host's kernels make of a case.
     fn by_wide_kernels(&mut self, case: &Case) -> Vec<String> {
-        let [left, right] = case.pair.each_ref().map(grey);
-        let Size { width, height } = left.size();
+        let Size { width, height } = grey(&case.pair[0]).size();
         self.storage.fit(width, height).expect("a small picture");
-        at_once(&mut self.storage.lend(), [left, right], case)
+        stages(&mut self.storage.lend(), case).0
     }
 
     /// The sum of a surface, or of the reason why there is none, on a number of threads.

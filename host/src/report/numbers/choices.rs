@@ -1,7 +1,7 @@
 //! What was given: the options with everything that follows from them, the images, the calibration.
 
 use super::super::{Run, words};
-use crate::calibration::Camera;
+use crate::calibration::{Camera, Lens};
 use crate::reconstruct::{Front, Mode, Pieces, Profile, Radius, Skeleton, settings};
 use crate::source::scene::Region;
 use crate::stage::balls::px;
@@ -149,7 +149,7 @@ impl Eye {
         Self {
             focal_px: [camera.fx, camera.fy],
             axis_px: [camera.cx, camera.cy],
-            distorted: !camera.distortion.is_none(),
+            distorted: camera.lens != Lens::NONE,
         }
     }
 }

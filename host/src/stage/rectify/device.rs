@@ -7,11 +7,11 @@ use image::GrayImage;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use rayon::prelude::*;
 use shared::bitmap::{Grey, Size};
-use shared::camera::{EyeModel, Lens, Mapping, PairModel};
+use shared::camera::{EyeModel, Mapping, PairModel};
 use shared::stage::warp::{Warp, knots};
 
 use super::{Rectification, RectifiedCamera, RectifyError, Turned};
-use crate::calibration::{Camera, Distortion, StereoCamera};
+use crate::calibration::{Camera, StereoCamera};
 
 impl Rectification {
     /// What a device has to know to make the same rectified pair. The images of [`Self::same_size`] are as
@@ -96,10 +96,7 @@ impl From<&PairModel> for StereoCamera {
             cx: eye.centre[0],
             cy: eye.centre[1],
             skew: eye.skew,
-            distortion: match eye.lens {
-                Lens::Polynomial(k) => Distortion::Polynomial(k),
-                Lens::Equidistant(k) => Distortion::Equidistant(k),
-            },
+            lens: eye.lens,
         };
         let turn = |eye: &EyeModel| Matrix3::from(eye.turn).transpose();
         Self {
@@ -117,10 +114,7 @@ fn eye_model(eye: &Turned) -> EyeModel {
         focal: [camera.fx, camera.fy],
         skew: camera.skew,
         centre: [camera.cx, camera.cy],
-        lens: match camera.distortion {
-            Distortion::Polynomial(k) => Lens::Polynomial(k),
-            Distortion::Equidistant(k) => Lens::Equidistant(k),
-        },
+        lens: camera.lens,
         turn: rows(eye.turn.inverse().matrix()),
     }
 }

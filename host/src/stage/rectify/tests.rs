@@ -3,7 +3,7 @@
 use image::Luma;
 
 use super::*;
-use crate::calibration::Distortion;
+use crate::calibration::Lens;
 
 /// Two unlike cameras with lenses, 80 mm apart, turned towards one another, tilted and rolled.
 fn verged() -> StereoCamera {
@@ -15,17 +15,10 @@ fn verged() -> StereoCamera {
         cx: 325.0,
         cy: 236.0,
         skew: 0.0,
-        distortion: Distortion::Polynomial([
-            -0.28, 0.09, 1e-3, -5e-4, -0.01, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
-        ]),
+        lens: Lens::Polynomial([-0.28, 0.09, 1e-3, -5e-4, -0.01, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
     };
-    let right = Camera {
-        fx: 690.0,
-        fy: 688.0,
-        skew: 0.4,
-        distortion: Distortion::Equidistant([0.02, -0.01, 0.0, 0.0]),
-        ..left
-    };
+    let right =
+        Camera { fx: 690.0, fy: 688.0, skew: 0.4, lens: Lens::Equidistant([0.02, -0.01, 0.0, 0.0]), ..left };
     let rotation = Rotation3::from_euler_angles(0.03, 0.15, -0.02).into_inner();
     StereoCamera { left, right, rotation, translation: Vector3::new(-79.0, 3.0, 12.0) }
 }
@@ -147,7 +140,7 @@ fn the_object_has_room_and_both_eyes_one_axis() {
 fn long_lenses_far_apart_get_an_axis_each() {
     let mut pair = verged();
     for camera in [&mut pair.left, &mut pair.right] {
-        *camera = Camera { fx: 9000.0, fy: 9000.0, skew: 0.0, distortion: Distortion::NONE, ..*camera };
+        *camera = Camera { fx: 9000.0, fy: 9000.0, skew: 0.0, lens: Lens::NONE, ..*camera };
     }
     pair.rotation = Rotation3::from_euler_angles(0.0, 0.25, 0.0).into_inner();
     pair.translation = Vector3::new(-400.0, 0.0, 50.0);
@@ -167,7 +160,7 @@ fn a_canvas_too_long_is_scaled_down() {
     let mut pair = verged();
     pair.left =
         Camera { width: 4000, height: 3000, fx: 4400.0, fy: 4400.0, cx: 2000.0, cy: 1500.0, ..pair.left };
-    pair.left.distortion = Distortion::NONE;
+    pair.left.lens = Lens::NONE;
     pair.right = pair.left;
     let camera = Rectification::whole(&pair).expect("verged").camera();
     assert_eq!(camera.width.max(camera.height), MAX_SIDE);
@@ -217,8 +210,7 @@ fn wrong_images_and_wrong_pairs_are_refused() {
         Err(RectifyError::Calibration(CalibrationError::Swapped { .. }))
     ));
     let mut folded = pair;
-    folded.left.distortion =
-        Distortion::Polynomial([-1.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    folded.left.lens = Lens::Polynomial([-1.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
     assert!(matches!(Rectification::whole(&folded), Err(RectifyError::Lens { eye: Eye::Left, .. })));
     assert!(Rectification::around(&folded, boxes(&folded)).is_ok());
     let nowhere = PixelBox { min: Point2::new(f64::NAN, 0.0), max: Point2::new(1.0, 1.0) };
@@ -237,7 +229,7 @@ fn the_turns_are_those_of_opencv() {
         cx: 200.55,
         cy: 322.27,
         skew: 0.0,
-        distortion: Distortion::NONE,
+        lens: Lens::NONE,
     };
     #[rustfmt::skip]
     let (rotation, left, right) = (

@@ -4,19 +4,17 @@
 use super::{Entry, Kernel, Scope, shown, step};
 use crate::images::{Image, grey};
 use crate::raster::Random;
-use firmware::stages;
 use host::export::ply::write_mesh;
 use host::memory::Storage;
 use host::mesh::Mesh;
 use host::reconstruct::{Options, Workspace};
 use host::stage::surface::{Mesher, RoundCone};
 use nalgebra::Point3;
-use shared::pipeline::{self, Settings};
+use shared::pipeline::{Settings, run};
 
 pub(super) fn entries() -> Vec<Entry> {
     let entry = |name, setup: fn(&Image) -> Box<dyn Kernel>| Entry::new(name, Scope::Pipeline, setup);
     vec![
-        entry("core", core),
         entry("shape/full", |image| shape(image, Settings::new(image.optics))),
         entry("shape/device", |image| shape(image, Settings::device(image.optics))),
         entry("mesh", mesh),
@@ -24,29 +22,15 @@ pub(super) fn entries() -> Vec<Entry> {
     ]
 }
 
-/// Both views, skeletons and all.
-fn core(image: &Image) -> Box<dyn Kernel> {
-    let (size, pair, settings) = (image.size(), image.pair.clone(), Settings::new(image.optics));
-    let mut storage = Storage::new(size.width, size.height).unwrap();
-    step(
-        None,
-        move |outcome| {
-            let [left, right] = pair.each_ref().map(grey);
-            *outcome = Some(pipeline::run(&mut storage.lend(), left, right, &settings, &mut ()).unwrap());
-        },
-        |outcome| shown(outcome),
-    )
-}
-
-/// What a device does: no skeleton of the right view.
+/// What the core describes, with all that it can or as a device.
 fn shape(image: &Image, settings: Settings) -> Box<dyn Kernel> {
     let (size, pair) = (image.size(), image.pair.clone());
     let mut storage = Storage::new(size.width, size.height).unwrap();
     step(
         None,
         move |outcome| {
-            let pair = pair.each_ref().map(grey);
-            *outcome = Some(stages::run(&mut storage.lend(), pair, &settings, &mut ()).unwrap());
+            let [left, right] = pair.each_ref().map(grey);
+            *outcome = Some(run(&mut storage.lend(), left, right, &settings, &mut ()).unwrap());
         },
         |outcome| shown(outcome),
     )
