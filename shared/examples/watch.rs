@@ -3,8 +3,9 @@
 //!     cargo run -p shared --example watch
 //!
 //! An [`Observer`] sees what each stage makes while it is in memory: for a log, a display, a measurement of one's
-//! own. [`Kernels`] are the loops that most of the time goes into; a processor with better instructions runs them
-//! its own way, as long as the bits stay the same (`firmware/src/board/dsp.rs`, `host/src/wide.rs`).
+//! own. This one wants to see the right eye's skeleton too, at the price of a second thinning. [`Kernels`] are the loops
+//! that most of the time goes into; a processor with better instructions runs them its own way, as long as the bits stay
+//! the same (`firmware/src/board/dsp.rs`, `host/src/wide.rs`).
 
 mod common;
 

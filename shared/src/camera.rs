@@ -209,7 +209,6 @@ impl Lens {
     pub const NONE: Self = Self::Polynomial([0.0; 12]);
 
     /// Where the image of the ray (x, y, 1) comes to lie.
-    #[inline]
     pub fn bend(&self, ray: Vector2<f64>) -> Vector2<f64> {
         let (x, y) = (ray.x, ray.y);
         let r2 = x * x + y * y;

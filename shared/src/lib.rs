@@ -1,8 +1,8 @@
 //! Ossature's core: from two grey pictures of one object to its described, matched skeleton.
 //!
 //! * **In**: a rectified pair of 8-bit grey images, up to [`limits::MAX_SIDE`] px a side, and memory that the caller lends.
-//! * **Out**: for each eye a mask, a sub-pixel contour, a skeleton as a graph; for the pair the depth of every medial
-//!   ball and the skeleton's branches as NURBS in (u, v, radius, disparity). A pair that is not to be trusted gives a
+//! * **Out**: for each eye a mask and a sub-pixel contour, for the left one a skeleton as a graph; for the pair the depth
+//!   of every medial ball and the skeleton's branches as NURBS in (u, v, radius, disparity). A pair that is not to be trusted gives a
 //!   [`Finding`](pipeline::Finding) instead.
 //! * **How**: `no_std`, without allocation, without `unsafe`, without a panic on any input; integers in the formats of
 //!   [`fixed`], so that every machine gives the same bits. [`camera`] alone computes in floating point, once a calibration.

@@ -152,25 +152,35 @@ impl Observer for Onlooker {
     }
 }
 
-/// The right eye's skeleton is of no use to the default method: neither that somebody looks at it nor that there is no
-/// room for it changes what comes out.
+/// The right eye's skeleton is of no use to the default method: neither that somebody looks at it, nor that it is
+/// erased, nor that there is no room for it changes what comes out.
 #[test]
 fn looking_on_changes_nothing() {
     let mut core = Core::default();
-    let pair = [hand(0), hand(9)].map(|picture| picture.concat());
-    let size = Size::new(150, 120).unwrap();
-    let [left, right] = pair.each_ref().map(|bytes| Grey::new(size, size.width, bytes).unwrap());
-    let made = [(false, true), (true, true), (true, false)].map(|(curious, room)| {
-        let (mut none, mut onlooker) = (heapless::Vec::<_, 1>::new(), Onlooker { curious, seen: 0 });
-        let mut memory = core.lend(size, "");
-        if !room {
-            memory.eyes[1].graph.nodes = &mut none;
-        }
-        let outcome = run(&mut memory, left, right, &Settings::new(OPTICS), &mut onlooker).unwrap();
-        (format!("{outcome:?}{:?}{:?}", memory.depths, memory.eyes[0].controls), onlooker.seen)
-    });
-    assert_eq!(made.each_ref().map(|(_, seen)| *seen), [1, 2, 1]);
-    assert!(made.iter().all(|(what, _)| *what == made[0].0));
+    let square = |first: usize| {
+        picture(150, 120, |u, v| {
+            let inside = (first..first + 48).contains(&u) && (30..78).contains(&v);
+            if inside { 210 } else { 12 }
+        })
+    };
+    let erases = Settings { thinning: Rule::ZhangSuen, ..Settings::new(OPTICS) };
+    for (pair, settings) in [([hand(0), hand(9)], Settings::new(OPTICS)), ([square(40), square(31)], erases)]
+    {
+        let made = [(false, true), (true, true), (true, false)].map(|(curious, room)| {
+            let (mut none, mut onlooker) = (heapless::Vec::<_, 0>::new(), Onlooker { curious, seen: 0 });
+            let [left, right] = pair.each_ref().map(|picture| picture.concat());
+            let grey = |bytes| Grey::new(size(&pair[0]), 150, bytes).unwrap();
+            let mut memory = core.lend(size(&pair[0]), "");
+            if !room {
+                memory.eyes[1].graph.nodes = &mut none;
+            }
+            let outcome = run(&mut memory, grey(&left), grey(&right), &settings, &mut onlooker).unwrap();
+            (format!("{outcome:?}{:?}{:?}", memory.depths, memory.eyes[0].controls), onlooker.seen)
+        });
+        assert_eq!(made[0].0.contains("SkeletonErased(Left)"), settings == erases);
+        assert!(made.iter().all(|(what, _)| *what == made[0].0));
+        assert_eq!([made[0].1, made[1].1], [1, 2]);
+    }
 }
 
 #[test]

@@ -3,9 +3,9 @@
 //! the settings of a device and with all that the core can do; and of the shapes at 160x120 in the memory of
 //! the smallest profile.
 //!
-//! The PC goes through both pictures at once, with words of 64 bits and memory without bounds; the boards
-//! take one picture after the other in the memory that the firmware has. Says loudly when QEMU is not there,
-//! and fails then if `CI=true`. With `-- --nocapture` it also says what each stage costs.
+//! The PC has words of 64 bits and memory without bounds, the boards words of 32 and the memory that the firmware
+//! has. Says loudly when QEMU is not there, and fails then if `CI=true`. With `-- --nocapture` it also says what
+//! each stage costs.
 
 use oracle::board;
 use oracle::core::Core;

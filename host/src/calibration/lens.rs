@@ -1,7 +1,7 @@
 //! From the image of a ray back to the ray: the inverse of [`Lens::bend`], which the core has no use for.
 //!
-//! Newton's method on normalised points, from the image itself, with the derivatives of the lens models that
-//! `shared/src/camera.rs` names its sources for.
+//! Newton's method on normalised points, from the image itself, with the derivatives of the lens models, of which
+//! `shared/src/camera.rs` names the sources.
 
 use nalgebra::{Matrix2, Point2, Vector2};
 use shared::camera::Lens;

@@ -65,8 +65,8 @@ impl Camera {
         Point2::new(self.fx * p.x + self.skew * p.y + self.cx, self.fy * p.y + self.cy)
     }
 
-    /// The ray (x, y, 1) that a pixel sees; nothing where the lens model cannot be inverted, see
-    /// [`unbend`](lens::unbend).
+    /// The ray (x, y, 1) that a pixel sees; nothing where the lens model folds over, or the ray stands at right angles
+    /// to the axis or beyond.
     #[must_use]
     pub fn ray_of(&self, pixel: Point2<f64>) -> Option<Point2<f64>> {
         let y = (pixel.y - self.cy) / self.fy;

@@ -113,7 +113,7 @@ impl Finding {
 }
 
 /// Collects findings and stops at those that refuse.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) struct Gates {
     pub(super) outcome: Outcome,
     lenient: bool,

@@ -52,7 +52,7 @@ pub struct EyeMemory<'a> {
     pub loops: &'a mut VecView<ContourLoop>,
     /// Vertices of the convex hull.
     pub hull: &'a mut VecView<PixelPoint>,
-    /// The skeleton's graph.
+    /// The skeleton's graph; the right eye's is empty unless the method or an observer asks for it.
     pub graph: Graph<'a>,
     /// Samples of its branches.
     pub samples: &'a mut VecView<Sample>,

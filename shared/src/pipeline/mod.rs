@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! each eye:  grey -> median -> threshold -> mask -> contour -> hull
-//!                                            mask -> distance -> skeleton -> graph, pruned
+//! the left:                                  mask -> distance -> skeleton -> graph, pruned
 //! the pair:  hulls -> invariants -> disparity plane -> row matching -> depth of each medial ball
 //!            graph + balls -> branches -> NURBS
 //! ```
@@ -148,7 +148,7 @@ pub struct Outcome {
 }
 
 /// Describe and match one rectified pair. The right eye is thinned for the paper's method, and for an observer that
-/// wants to see it ([`Observer::wants_both_skeletons`]), on whom nothing that comes out depends.
+/// wants to see it ([`Observer::wants_both_skeletons`]), on whom nothing but that eye's graph depends.
 ///
 /// # Errors
 /// The first [`Finding`] that refuses; with [`Method::Paper`] only one that leaves nothing to go on with.
@@ -169,8 +169,12 @@ pub fn run(
     match settings.method {
         Method::Paper(_) => run.skeleton(Side::Right, right_eye, scratch, observer)?,
         Method::Default if observer.wants_both_skeletons() => {
-            // A copy, whose findings and lack of memory are none of the pair's.
-            let _ = run.clone().skeleton(Side::Right, right_eye, scratch, observer);
+            // Neither what is found there nor a lack of memory is the pair's.
+            let (kernels, mut gates) = (&memory.kernels, Gates::new(settings));
+            let whose = (Side::Right, right.size());
+            if eye::skeleton(whose, right_eye, scratch, (settings, kernels), &mut gates, observer).is_err() {
+                right_eye.graph.clear();
+            }
         }
         Method::Default => (),
     }
@@ -179,7 +183,7 @@ pub fn run(
 
 /// A run in its steps, for a device that has room for but one picture at a time: the outlines of both eyes, the
 /// left one's skeleton, then the pair. [`run`] goes the same steps.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Run {
     settings: Settings,
     kernels: Kernels,

@@ -154,3 +154,42 @@ impl<L: Floats> Cone<L> {
         (far - radius, far)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+    use wide::f32x8;
+
+    use super::super::{RoundCone, block::tests::cones, vectors::all};
+    use super::*;
+
+    /// In cubes of 0.7 mm, at places about a region's middle: near a surface to a ten-thousandth. Near an axis, deep
+    /// inside, digits of `away` are lost, of which nothing depends there but the sign.
+    #[test]
+    fn both_ways_to_ask_give_the_distances_of_double_precision() {
+        let (cube, middle) = (0.7, Point3::new(9.3, 8.1, 7.6));
+        let swallowed = RoundCone { centres: [middle, middle + Vector3::x()], radii: [3.0, 1.0] };
+        let solid: Vec<_> = cones().iter().chain([&swallowed]).map(Distance::to).collect();
+        let (list, mut groups) = (Vec::from_iter(0..solid.len() as u32), Vec::new());
+        prepare(&list, &solid, &middle, cube, &mut groups);
+        assert_eq!(groups.len(), solid.len().div_ceil(LANES));
+        for place in 0..9 * 9 * 9 {
+            let way = [place / 81, place / 9 % 9, place % 9].map(|i| f64::from(i - 4));
+            let p = middle + Vector3::from(way) * cube;
+            let offset = all::<f32x8>(way.map(|x| x as f32));
+            let each = groups.iter().flat_map(|group| Cone::each(group).at(offset).0.store());
+            for ((number, cone), one_of_eight) in solid.iter().enumerate().zip(each) {
+                let exact = cone.at(&p) / cube;
+                let alone = Cone::of(&groups, number).at(offset).0.store();
+                assert_eq!(alone, [one_of_eight; LANES], "cone {number}, {way:?}");
+                let allowed = if exact.abs() < 1.0 { 1e-4 } else { 1e-2 };
+                assert!(
+                    (f64::from(one_of_eight) - exact).abs() < allowed,
+                    "{number} {way:?} {one_of_eight} {exact}"
+                );
+            }
+        }
+        let filled = Cone::each(groups.last().unwrap()).at(all::<f32x8>([0.0; 3])).0.store();
+        assert!(filled[solid.len() % LANES..].iter().all(|far| *far > 1e14), "{filled:?}");
+    }
+}
