@@ -98,6 +98,8 @@ impl Worker {
     /// One whose standard error goes to a file.
     pub(crate) fn start(errors: &Path) -> Self {
         let mut child = part(&["hosts"])
+            // One heap for all threads: how they share out several hides whether what is in them grows.
+            .env("MALLOC_ARENA_MAX", "1")
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(File::create(errors).expect("a file"))
